@@ -1,0 +1,45 @@
+# make figures   set up .venv from the lock, then regenerate every figure
+# make test      the same set-up, then unit tests, doctests and the notebooks
+.PHONY: help figures test check bench data clean
+.DEFAULT_GOAL := help
+
+# The lock is for Python 3.11: the first of these that really is one.
+PYTHON ?= $(shell for p in python3.11 python3 python; do \
+	"$$p" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' >/dev/null 2>&1 && { echo "$$p"; break; }; done)
+RUN := .venv/bin/python
+export MPLBACKEND := Agg
+
+help:  ## this list
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 10
+
+figures: .venv/ready  ## simulate, observe, learn, perform and draw every figure into figures/
+	$(RUN) -m dollop.figures
+
+test: .venv/ready  ## unit tests, doctests, notebooks
+	$(RUN) -m pytest -n 2 -q
+	env -u MPLBACKEND $(RUN) -m pytest --nbmake --nbmake-timeout=120 -n 2 -q -p no:doctest notebooks
+
+check: .venv/ready  ## lint and formatting
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m nbstripout --verify notebooks/*.ipynb
+
+bench: .venv/ready  ## benchmarks beside plain baselines, one thread
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(RUN) -m benchmarks
+
+data: .venv/ready  ## remake the recordings in data/ that the notebooks read
+	$(RUN) -m dollop.cli data
+
+clean:  ## remove .venv and caches; figures and recordings stay
+	rm -rf .venv build *.egg-info .pytest_cache .hypothesis .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.venv/ready: environment.txt pyproject.toml
+	@test -n "$(PYTHON)" || { echo "Dollop needs Python 3.11, and none was found." >&2; \
+	  echo "Get one: 'apt install python3.11 python3.11-venv', 'brew install python@3.11', 'pyenv install 3.11'," >&2; \
+	  echo "or from python.org; then run make again, or name it: make PYTHON=/path/to/python3.11 ..." >&2; exit 1; }
+	rm -rf .venv
+	"$(PYTHON)" -m venv .venv || { echo "Python's venv module is missing: 'apt install python3.11-venv' on Debian and Ubuntu." >&2; exit 1; }
+	$(RUN) -m pip install --quiet --disable-pip-version-check -r environment.txt
+	$(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@

@@ -1,0 +1,88 @@
+"""Sequenced LDS: how long the exact search takes, beside the same search with one segment after the other.
+
+python benchmarks/bench_lds.py
+"""
+
+import os
+
+os.environ.update({name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")})
+
+import statistics  # noqa: E402
+import time  # noqa: E402
+
+import numpy as np  # noqa: E402
+
+from dollop.lds import DECAY, HORIZON, STEPS, LDS, SequencedLDS, Statistics, fewest_segments  # noqa: E402
+from dollop.trajectory import align, distance_to_polyline, retime  # noqa: E402
+
+SAMPLES, CANDIDATES = 200, 100
+BOUNDS = {1: 0.1, 5: 0.5}  # s
+
+
+def laps(n, seed=0):
+    """n laps of a wobbling figure-eight, about 17 m and 200 samples each, no two alike."""
+    rng, angle = np.random.default_rng(seed), np.linspace(0, 2 * np.pi, SAMPLES)
+    eight = np.stack([3.2 * np.sin(angle), 1.3 * np.sin(2 * angle)], axis=1)
+    waves = np.sin(np.arange(1, 6)[:, None] * angle)
+    return [eight + (0.05 * rng.normal(size=(2, 5)) @ waves).T for _ in range(n)]
+
+
+def plain_fit(walks, tolerance=0.02):
+    """The number of segments by the plain way: every candidate segment cut out, re-timed, fitted and measured alone."""
+    aligned, _ = align(walks, 2 * CANDIDATES - 1)
+    path = aligned.mean(axis=0)[::2]
+    errors = np.full((CANDIDATES, CANDIDATES), np.inf)
+    for i in range(CANDIDATES):
+        for j in range(i + 2, CANDIDATES):
+            first, *others = (Statistics.of(retime(walk[2 * i : 2 * j + 1], STEPS, DECAY)) for walk in aligned)
+            response = LDS.from_statistics(sum(others, first), path[j]).response(path[i], HORIZON)
+            errors[i, j] = distance_to_polyline(path[i + 1 : j], np.vstack([response, path[j]])).sum()
+    return len(fewest_segments(errors, tolerance)) - 1
+
+
+def seconds(call, repeats):
+    """Median duration of a call in s, and its last result."""
+    durations = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        result = call()
+        durations.append(time.perf_counter() - begin)
+    return statistics.median(durations), result
+
+
+def run(repeats=15):
+    """Time `SequencedLDS.fit` on one lap and on five.
+
+    Returns
+    -------
+    list of dict
+        name, median_s, baseline_s (the plain loop), ratio, bound (s), and the segments found by both.
+    """
+    rows = []
+    for n, bound in BOUNDS.items():
+        walks = laps(n)
+        SequencedLDS.fit(walks)
+        median, law = seconds(lambda walks=walks: SequencedLDS.fit(walks), repeats)
+        baseline, plain = seconds(lambda walks=walks: plain_fit(walks), 1)
+        name = f"SequencedLDS.fit, {n} x {SAMPLES} samples"
+        found = {"segments": len(law.segments), "baseline_segments": plain}
+        rows.append(
+            {
+                "name": name,
+                "median_s": median,
+                "baseline_s": baseline,
+                "ratio": baseline / median,
+                "bound": bound,
+                **found,
+            }
+        )
+    return rows
+
+
+if __name__ == "__main__":
+    for row in run():
+        print(
+            "{name:40s} {median_s:7.3f} s  bound {bound:.1f} s  plain loop {baseline_s:6.2f} s  {ratio:5.0f} x".format(
+                **row
+            )
+        )

@@ -1,0 +1,52 @@
+"""Dollop: learning by observation with a mobile robot (Dixon & Khosla, ICRA 2004).
+
+A person shows a task by walking it; the robot watches with its laser, extracts subgoals, ties them to the objects in
+the room, learns one model from several demonstrations and performs the task.
+
+The paper's notation, and where it lives:
+
+=====================  ======================================================================  ====================
+symbol                 meaning                                                                 name
+=====================  ======================================================================  ====================
+x_n                    position on a trajectory relative to the segment's subgoal (Sec. III)   `LDS.step`
+A                      matrix of one LDS, x_{n+1} = A x_n (Sec. III)                           `LDS.A`
+g                      subgoal: where a segment ends (Sec. III)                                `LDS.goal`
+Omega^i                environment configuration of demonstration i: 4N corners (Sec. IV)      `Environment.corners`
+omega_m^i              corner m of Omega^i (Sec. IV-A)                                         row m of it
+k_{m,n}^i              spring constant between two corners (Sec. IV-A)                         `spring_constants`
+f_m^i                  force on a corner (Sec. IV-A)                                           `spring_forces`
+c(omega_m, omega_n)    cost of matching two corners, an integer (Sec. IV-A)                    `integer_costs`
+alpha                  scale of the cost before rounding up (Sec. IV-A)                        `alpha`
+g(.)                   the matching of two environment configurations (Sec. IV-A)              `Matching.indices`
+m                      how many of the closest corners a subgoal is tied to (Sec. IV-B)        `m` of `associate`
+=====================  ======================================================================  ====================
+
+SI units throughout; a pose is (x, y, theta); time comes first in every array.
+"""
+
+from dollop.environment import Environment
+from dollop.files import FormatError
+from dollop.gridmap import OccupancyGrid
+from dollop.laser import LaserLog
+from dollop.lds import LDS, SequencedLDS
+from dollop.logs import read_log, write_log
+from dollop.observation import Observation, observe
+from dollop.tracking import Motion, Track, Tracker
+from dollop.trajectory import laps
+
+__all__ = [
+    "LDS",
+    "Environment",
+    "FormatError",
+    "LaserLog",
+    "Motion",
+    "Observation",
+    "OccupancyGrid",
+    "SequencedLDS",
+    "Track",
+    "Tracker",
+    "laps",
+    "observe",
+    "read_log",
+    "write_log",
+]

@@ -1,0 +1,304 @@
+"""Sec. IV-B: subgoals associated with objects, so that they move as the objects move.
+
+From one demonstration, the paper's way: a subgoal s keeps its differences to the m nearest corners,
+
+    s' = sum_l w_l (omega'_g(l) + s - omega_l),      w_l ~ 1 / (||s - omega_l||^2 + eps),   sum_l w_l = 1.
+
+The paper says only that "closer environment objects have higher weights"; this form of the weights is a reconstruction.
+
+Several demonstrations among objects that stood elsewhere each time are a second source of evidence (beyond the paper):
+beside the object that matters, they vary little. Here each object is a frame, a position with a direction, and
+
+    w_l ~ 1 / (d_l^2 + eps)  *  1 / v_l
+
+with d_l the distance of the subgoal from frame l and v_l its variance seen from frame l, over the demonstrations. Of
+one demonstration there is no variance, and between demonstrations in one and the same environment it is equal beside
+all objects: in both cases closeness alone is left.
+"""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from .environment import Environment
+
+_EPSILON = 0.05**2  # m²: corners are not known better than to a cell of the foreground grid
+
+
+@dataclass(frozen=True, eq=False)
+class Association:
+    """K subgoals, each tied to m corners of an environment.
+
+    Attributes
+    ----------
+    environment : Environment
+        Where the subgoals were demonstrated.
+    corners : (K, m) int array
+        Which corners each subgoal is tied to, the nearest first.
+    weights : (K, m) array
+        w_l, one row sums to 1.
+    differences : (K, m, 2) array
+        s - omega_l in m.
+    """
+
+    environment: Environment
+    corners: np.ndarray
+    weights: np.ndarray
+    differences: np.ndarray
+
+    def relocate(self, environment, matching=None, turned=False):
+        """Where the subgoals are when the objects stand elsewhere (Sec. IV-B).
+
+        Parameters
+        ----------
+        environment : Environment
+            The objects as they stand now.
+        matching : Matching, optional
+            From the associated environment to this one; by default the objects are the same in the same order. Corners
+            that it leaves out drop out, and the weights of a subgoal's other corners take their part.
+        turned : bool
+            Beyond the paper: turn the differences with the layout, see `layout_turn`.
+
+        Returns
+        -------
+        (K, 2) array
+            Subgoals in m.
+
+        Raises
+        ------
+        ValueError
+            Without matching, where the counts differ; with one, where it belongs to other environments or leaves out
+            all corners of a subgoal.
+        """
+        indices = self._indices(environment, matching)
+        partners = indices[self.corners]
+        weights = self.weights * (partners >= 0)
+        totals = weights.sum(axis=1, keepdims=True)
+        if (totals == 0).any():
+            number = np.flatnonzero(totals == 0)[0]
+            raise ValueError(
+                f"a subgoal needs one matched corner at least, but the matching leaves out all of subgoal {number}: "
+                f"corners {self.corners[number].tolist()}"
+            )
+        differences = self.differences
+        if turned:
+            matched = indices >= 0
+            turn = layout_turn(self.environment.corners[matched], environment.corners[indices[matched]])
+            differences = differences @ _rotations(turn).T
+        return np.einsum("km,kmd->kd", weights / totals, environment.corners[partners] + differences)
+
+    def _indices(self, environment, matching):
+        n, m = len(self.environment.corners), len(environment.corners)
+        if matching is None:
+            if n != m:
+                raise ValueError(f"without a matching the number of objects must stay {n // 4}, got {m // 4}")
+            return np.arange(n)
+        if len(matching.indices) != n or matching.indices.max(initial=-1) >= m:
+            raise ValueError(
+                f"the matching must go from the {n} associated corners to the {m} present ones, "
+                f"got {len(matching.indices)} indices up to {matching.indices.max(initial=-1)}"
+            )
+        return matching.indices
+
+
+def associate(subgoals, environment, m=4):
+    """Tie each subgoal to the corners nearest to it (Sec. IV-B).
+
+    Parameters
+    ----------
+    subgoals : (K, 2) array
+        Positions in m.
+    environment : Environment
+        One object at least.
+    m : int
+        How many corners a subgoal is tied to.
+
+    Returns
+    -------
+    Association
+
+    Raises
+    ------
+    ValueError
+        No objects, more corners asked for than there are, a subgoal that is not finite.
+
+    Examples
+    --------
+    Objects that all move by the same take the subgoals with them.
+
+    >>> boxes = np.array([[0, 0, 0.4, 0.4], [4, 0, 4.4, 0.4]])
+    >>> association = associate([[1.0, 1.0]], Environment(boxes))
+    >>> association.relocate(Environment(boxes + [0.5, 2.0, 0.5, 2.0])).round(9).tolist()
+    [[1.5, 3.0]]
+    """
+    subgoals = _checked_positions(subgoals, "subgoals")
+    corners = environment.corners
+    if len(corners) == 0:
+        raise ValueError("subgoals can only be associated with an environment of at least 1 object, got 0")
+    if not 1 <= m <= len(corners):
+        raise ValueError(f"m must be between 1 and the number of corners {len(corners)}, got {m}")
+    differences = subgoals[:, None] - corners
+    squares = (differences**2).sum(axis=2)
+    nearest = np.argsort(squares, axis=1, kind="stable")[:, :m]
+    weights = 1 / (np.take_along_axis(squares, nearest, axis=1) + _EPSILON)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return Association(environment, nearest, weights, np.take_along_axis(differences, nearest[..., None], axis=1))
+
+
+def layout_turn(corners_i, corners_j):
+    """By how much a layout has turned: the least-squares angle between matched points.
+
+    Parameters
+    ----------
+    corners_i, corners_j : (C, 2) arrays
+        Positions in m, row by row the same corner.
+
+    Returns
+    -------
+    float
+        Angle in (-pi, pi], counter-clockwise from i to j; 0 where there is nothing to tell it from.
+
+    Examples
+    --------
+    >>> square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    >>> round(np.degrees(layout_turn(square, square[[1, 2, 3, 0]])))
+    90
+    """
+    z, w = (np.asarray(corners, dtype=float) @ (1, 1j) for corners in (corners_i, corners_j))
+    return float(np.angle((z - z.mean()).conj() @ (w - w.mean())))
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Objects that have a direction as well as a position.
+
+    Parameters
+    ----------
+    positions : (M, 2) array
+        In m.
+    directions : (M,) array
+        In rad, counter-clockwise from +x.
+
+    Raises
+    ------
+    ValueError
+        Where the shapes do not belong together or a number is not finite.
+    """
+
+    positions: np.ndarray
+    directions: np.ndarray
+
+    def __post_init__(self):
+        positions = _checked_positions(self.positions, "positions")
+        directions = np.array(self.directions, dtype=float)
+        if directions.shape != positions.shape[:1]:
+            raise ValueError(f"directions must have the shape {positions.shape[:1]}, got {directions.shape}")
+        if not np.isfinite(directions).all():
+            raise ValueError(f"directions must be finite, got {directions.tolist()}")
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "directions", (directions + pi) % (2 * pi) - pi)
+
+    @classmethod
+    def of(cls, environment):
+        """The boxes of an environment as frames: their centres, all of direction 0, for a laser sees no direction."""
+        return cls(environment.centres, np.zeros(len(environment)))
+
+    def __len__(self):
+        return len(self.positions)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameAssociation:
+    """K subgoals tied to M frames.
+
+    Attributes
+    ----------
+    local : (M, K, 2) array
+        Each subgoal as seen from each frame, in m.
+    weights : (M, K) array
+        How much each frame counts for each subgoal, one column sums to 1.
+    """
+
+    local: np.ndarray
+    weights: np.ndarray
+
+    def relocate(self, frames):
+        """Where the subgoals (K, 2) are, in m, when the frames stand elsewhere: the same frames in the same order."""
+        if len(frames) != len(self.local):
+            raise ValueError(f"the number of frames must stay {len(self.local)}, got {len(frames)}")
+        moved = self.local @ _rotations(frames.directions).swapaxes(1, 2) + frames.positions[:, None]
+        return np.einsum("mk,mkd->kd", self.weights, moved)
+
+
+def associate_with_frames(subgoals, frames):
+    """Tie subgoals to frames, by closeness and, from several demonstrations, by how little they vary.
+
+    Parameters
+    ----------
+    subgoals : (D, K, 2) array
+        Of D demonstrations, in m; subgoal k means the same in each.
+    frames : sequence of D Frames
+        How the M objects stood in each demonstration, in the same order.
+
+    Returns
+    -------
+    FrameAssociation
+
+    Raises
+    ------
+    ValueError
+        No demonstration, no frame, counts that differ, a number that is not finite.
+
+    Examples
+    --------
+    A goal between two objects, as near to one as to the other, that moved with the second: that is the one to follow.
+
+    >>> still, moved = Frames([[0, 0], [2, 0]], [0, 0]), Frames([[0, 0], [2, 2]], [0, 0])
+    >>> associate_with_frames([[[1, 0]]], [still]).weights.ravel().round(2).tolist()
+    [0.5, 0.5]
+    >>> bool(associate_with_frames([[[1, 0]], [[1, 2]]], [still, moved]).weights[1, 0] > 0.8)
+    True
+    """
+    subgoals = np.array(subgoals, dtype=float)
+    if subgoals.ndim != 3 or subgoals.shape[2] != 2 or subgoals.shape[0] == 0:
+        raise ValueError(f"subgoals must have the shape (D, K, 2) with D at least 1, got {subgoals.shape}")
+    if not np.isfinite(subgoals).all():
+        raise ValueError("subgoals must be finite, got a value that is not")
+    counts = [len(f) for f in frames]
+    if len(counts) != len(subgoals) or len(set(counts)) != 1 or counts[0] == 0:
+        raise ValueError(
+            f"each of {len(subgoals)} demonstrations needs the same frames, at least 1, got counts {counts}"
+        )
+    local = np.stack([_seen_from(f, s) for f, s in zip(frames, subgoals, strict=True)])
+    weights = 1 / ((local**2).sum(axis=3).mean(axis=0) + _EPSILON) / _variances(local)
+    return FrameAssociation(local.mean(axis=0), weights / weights.sum(axis=0))
+
+
+def _variances(local):
+    """(M, K) variance of D demonstrations (D, M, K, 2), up to a factor; of one alone it is the same for all frames."""
+    squares = ((local - local.mean(axis=0)) ** 2).sum(axis=(0, 3))
+    # A handful of demonstrations may agree by chance: one virtual one, of mean variance, keeps the weights finite.
+    usual = squares.mean() / max(len(local) - 1, 1)
+    return squares + (usual if usual > 0 else 1.0)
+
+
+def _seen_from(frames, positions):
+    """(M, K, 2): positions (K, 2) in the coordinates of each frame."""
+    return (positions - frames.positions[:, None]) @ _rotations(frames.directions)
+
+
+def _rotations(angles):
+    """(..., 2, 2) rotation matrices, counter-clockwise."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    return np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
+
+
+def _checked_positions(positions, name):
+    positions = np.array(positions, dtype=float)
+    if positions.ndim != 2 or positions.shape[1] != 2:
+        raise ValueError(f"{name} must have the shape (N, 2), got {positions.shape}")
+    if not np.isfinite(positions).all():
+        number = np.flatnonzero(~np.isfinite(positions).all(axis=1))[0]
+        raise ValueError(f"{name} must be finite, got {positions[number].tolist()} in row {number}")
+    return positions

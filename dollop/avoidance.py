@@ -1,0 +1,253 @@
+"""Obstacle-aware modulation of a control law: round what the robot knows of, and unchanged where nothing is near.
+
+The direction u of the law is turned along the surface of what is near (Khansari-Zadeh and Billard, "A dynamical system
+approach to realtime obstacle avoidance", Autonomous Robots 32, 2012): with n the unit normal away from the obstacle
+and t the tangent,
+
+    u' = (1 - 1/Gamma) (n.u) n + (1 + 1/Gamma) (t.u) t     where n.u < 0,    u' = u elsewhere.
+
+Gamma is 1 at the distance that is kept and grows to infinity where the influence ends; below the kept distance the
+factor of n is negative and the robot is led out. The normal comes from the distance field of the map, so that desks and
+walls need no shape of their own. In a concave corner this comes to a halt; the way out is then a `Geodesic`.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import cos, hypot, inf, sin, sqrt
+
+import numpy as np
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+ROBOT_RADIUS = 0.25
+"""Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
+KEPT, INFLUENCE = 0.15, 0.50
+"""Distance in m between the robot's edge and an obstacle that the modulation keeps, and at which it sets in."""
+FREE_BELOW = 0.2
+"""Occupancy below which a cell is trusted to be free: a stool's thin column is missed by most beams in its cell."""
+CROWDING = 4.0
+"""How many times longer a metre counts for the geodesic where the robot would touch something."""
+OPEN_BORDER = 3.0
+AHEAD = 6  # cells of a shortest path over which its direction is taken: one cell alone knows eight directions
+
+
+@dataclass(frozen=True, eq=False)
+class ObstacleMap:
+    """Distances to what the robot must not touch, made for looking up one place at a time.
+
+    Attributes
+    ----------
+    distances : (H, W) float array
+        From each cell's centre to the nearest obstacle's edge in m, negative inside.
+    origin : (float, float)
+        Lower left corner, x, y in m.
+    resolution : float
+        Side of a cell in m.
+    radius : float
+        The robot's in m.
+
+    Examples
+    --------
+    A box of 2 m by 2 m, and the robot's edge 0.75 m from it.
+
+    >>> from dollop.environment import Environment
+    >>> obstacles = ObstacleMap.of(Environment([[0, 0, 2, 2]]))
+    >>> round(obstacles.edge(3.0, 1.0), 2)
+    0.75
+    """
+
+    distances: np.ndarray
+    origin: tuple
+    resolution: float
+    radius: float = ROBOT_RADIUS
+    lookup: list = field(init=False, repr=False)
+
+    def __post_init__(self):
+        object.__setattr__(self, "lookup", self.distances.ravel().tolist())  # lists answer single questions faster
+
+    @classmethod
+    def of(cls, environment, background=None, places=(), radius=ROBOT_RADIUS, resolution=0.05):
+        """The obstacles of an environment before a background.
+
+        Parameters
+        ----------
+        environment : Environment
+            Its boxes are obstacles.
+        background : OccupancyGrid, optional
+            All that is not free is an obstacle, and so is all around the map. Without it the world is open.
+        places : (N, 2) array_like, optional
+            Without a background: places in m that the map must hold as well.
+        radius : float
+            The robot's in m.
+        resolution : float
+            Without a background: side of a cell in m.
+        """
+        if background is None:
+            origin, shape = open_frame(environment.boxes, places, resolution)
+            blocked = np.zeros(shape, dtype=bool)
+        else:
+            origin, resolution = background.origin, background.resolution
+            blocked = ~(background.occupancy < FREE_BELOW)
+            blocked[[0, -1]], blocked[:, [0, -1]] = True, True
+        blocked = blocked | covered_cells(environment.boxes, origin, resolution, blocked.shape)
+        return cls(signed_distance(blocked, resolution), origin, resolution, radius)
+
+    def edge(self, x, y):
+        """Distance in m between the edge of a robot at x, y in m and the nearest obstacle, negative in contact."""
+        return self.edge_and_slope(x, y)[0]
+
+    def edge_and_slope(self, x, y):
+        """`edge`, and how much it grows per m along x and along y; bilinear between the cells' centres."""
+        rows, columns = self.distances.shape
+        across = min(max((x - self.origin[0]) / self.resolution - 0.5, 0.0), columns - 1.001)
+        up = min(max((y - self.origin[1]) / self.resolution - 0.5, 0.0), rows - 1.001)
+        column, row = int(across), int(up)
+        right, top = across - column, up - row
+        corner, lookup = row * columns + column, self.lookup
+        a, b, c, d = lookup[corner], lookup[corner + 1], lookup[corner + columns], lookup[corner + columns + 1]
+        lower, upper = a + right * (b - a), c + right * (d - c)
+        slope_x = ((b - a) * (1 - top) + (d - c) * top) / self.resolution
+        return lower + top * (upper - lower) - self.radius, slope_x, (upper - lower) / self.resolution
+
+    def edges(self, positions):
+        """`edge` for (N, 2) positions in m at once: (N,)."""
+        at = (np.asarray(positions)[:, ::-1] - np.array(self.origin)[::-1]) / self.resolution - 0.5
+        return ndimage.map_coordinates(self.distances, at.T, order=1, mode="nearest") - self.radius
+
+    def holds(self, x, y):
+        """Whether x, y in m lies on the map."""
+        rows, columns = self.distances.shape
+        side = self.resolution
+        return 0 <= x - self.origin[0] < columns * side and 0 <= y - self.origin[1] < rows * side
+
+    def modulate(self, x, y, ux, uy):
+        """The direction (ux, uy) of a law at x, y in m, turned along what is near; unchanged where nothing is."""
+        edge, nx, ny = self.edge_and_slope(x, y)
+        towards = nx * ux + ny * uy
+        length = nx * nx + ny * ny
+        if edge >= INFLUENCE or towards >= 0 or length < 1e-6:  # between two obstacles alike the slope is nought
+            return ux, uy
+        along = towards / length
+        normal_x, normal_y = along * nx, along * ny
+        share = (INFLUENCE - edge) / (INFLUENCE - KEPT)  # 1 / Gamma
+        turned_x = (1 - share) * normal_x + (1 + share) * (ux - normal_x)
+        turned_y = (1 - share) * normal_y + (1 + share) * (uy - normal_y)
+        size = hypot(turned_x, turned_y)
+        return (turned_x / size, turned_y / size) if size > 1e-9 else (ux, uy)
+
+    def speed_limit(self, x, y, theta, deceleration, period):
+        """Speed in m/s from which a robot still stops before it touches, whatever the direction of what is near.
+
+        One that has next to no room left may only creep, and only outwards.
+        """
+        edge, nx, ny = self.edge_and_slope(x, y)
+        if edge <= 0.02:
+            return 0.05 if nx * cos(theta) + ny * sin(theta) > 0.2 else 0.0
+        return deceleration * (sqrt(period * period + 2 * edge / deceleration) - period)
+
+    @cached_property
+    def passable(self):
+        """(H, W) bool array: cells where the robot touches nothing, with some room to spare."""
+        return self.distances - self.radius > KEPT / 3
+
+    @cached_property
+    def nearest_passable(self):
+        """Flat index of the passable cell nearest to each cell, as a list."""
+        row, column = ndimage.distance_transform_edt(~self.passable, return_distances=False, return_indices=True)
+        return (row * self.distances.shape[1] + column).ravel().tolist()
+
+    @cached_property
+    def neighbours(self):
+        """Sparse (H W, H W) costs in m between passable cells side by side or corner to corner."""
+        rows, columns = self.distances.shape
+        index = np.arange(rows * columns).reshape(rows, columns)
+        room = np.clip((self.distances - self.radius) / INFLUENCE, 0.0, 1.0)
+        cost = self.resolution * (1 + CROWDING * (1 - room))
+        heads, tails, costs = [], [], []
+        for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            here = np.s_[: rows - down, max(-right, 0) : columns - max(right, 0)]
+            there = np.s_[down:, max(right, 0) : columns + min(right, 0)]
+            both = self.passable[here] & self.passable[there]
+            heads.append(index[here][both])
+            tails.append(index[there][both])
+            costs.append(hypot(down, right) * (cost[here] + cost[there])[both] / 2)
+        return coo_array(
+            (np.concatenate(costs), (np.concatenate(heads), np.concatenate(tails))), shape=(index.size, index.size)
+        ).tocsr()
+
+    def cell(self, x, y):
+        """Flat index of the passable cell nearest to x, y in m."""
+        rows, columns = self.distances.shape
+        column = min(max(int((x - self.origin[0]) / self.resolution), 0), columns - 1)
+        row = min(max(int((y - self.origin[1]) / self.resolution), 0), rows - 1)
+        return self.nearest_passable[row * columns + column]
+
+    def centre(self, cell):
+        """x, y in m of the centre of the cell with flat index `cell`."""
+        row, column = divmod(cell, self.distances.shape[1])
+        return self.origin[0] + (column + 0.5) * self.resolution, self.origin[1] + (row + 0.5) * self.resolution
+
+
+class Geodesic:
+    """Shortest ways on an ObstacleMap to one place; where the place is too near to something, to the nearest that is not.
+
+    Parameters
+    ----------
+    obstacles : ObstacleMap
+    goal : (2,) sequence of float
+        m.
+    """
+
+    def __init__(self, obstacles, goal):
+        self.obstacles = obstacles
+        self.goal_cell = obstacles.cell(*goal)
+        self.goal = obstacles.centre(self.goal_cell)
+        distances, before = dijkstra(
+            obstacles.neighbours, directed=False, indices=self.goal_cell, return_predecessors=True
+        )
+        self.distances, self.before = distances.tolist(), before.tolist()
+
+    def distance(self, x, y):
+        """Length of the way from x, y in m, counted longer where it is narrow; `inf` where there is none."""
+        return self.distances[self.obstacles.cell(x, y)]
+
+    def direction(self, x, y):
+        """Unit vector along the way from x, y in m; zero where there is none, and at its end."""
+        cell = self.obstacles.cell(x, y)
+        if self.distances[cell] == inf:
+            return 0.0, 0.0
+        for _ in range(AHEAD):
+            cell = self.before[cell] if cell != self.goal_cell else cell
+        ahead_x, ahead_y = self.obstacles.centre(cell)
+        size = hypot(ahead_x - x, ahead_y - y)
+        return ((ahead_x - x) / size, (ahead_y - y) / size) if size > 1e-9 else (0.0, 0.0)
+
+
+def open_frame(boxes, places, resolution):
+    """Corner and shape of a map that holds boxes (N, 4) and places (M, 2) with a border of 3 m."""
+    points = np.concatenate([boxes[:, :2], boxes[:, 2:], np.reshape(places, (-1, 2))])
+    if not len(points):
+        points = np.zeros((1, 2))
+    low, high = points.min(axis=0) - OPEN_BORDER, points.max(axis=0) + OPEN_BORDER
+    columns, rows = np.ceil((high - low) / resolution).astype(int)
+    return tuple(low.tolist()), (rows, columns)
+
+
+def covered_cells(boxes, origin, resolution, shape):
+    """(H, W) bool array: cells that one of the boxes (N, 4) reaches into."""
+    covered = np.zeros(shape, dtype=bool)
+    low = np.floor((boxes[:, :2] - origin) / resolution + 1e-9).astype(int).clip(0)
+    high = np.ceil((boxes[:, 2:] - origin) / resolution - 1e-9).astype(int).clip(0)
+    for (left, bottom), (right, top) in zip(low, high, strict=True):
+        covered[bottom:top, left:right] = True
+    return covered
+
+
+def signed_distance(blocked, resolution):
+    """From the centre of each cell to the edge of what is blocked, in m, negative inside; far where nothing is."""
+    if not blocked.any():
+        return np.full(blocked.shape, 1e3)
+    outside = ndimage.distance_transform_edt(~blocked)
+    inside = ndimage.distance_transform_edt(blocked)
+    return resolution * (outside - inside - np.where(blocked, -0.5, 0.5))

@@ -1,0 +1,176 @@
+"""Sec. IV: the environment configuration, and the springs between its corners.
+
+The objects of the lab are axis-parallel boxes; the paper's environment configuration is the set of their corners
+omega_1 ... omega_4N. Between any two corners of one environment there is a spring, stronger where they are closer,
+
+    k_mn = ||omega_m - omega_n||^-2,      f_m = sum_{n != m} k_mn (omega_n - omega_m) / ||omega_n - omega_m||,
+
+and matching corner m of environment i with corner n of environment j costs ceil(alpha ||f_m^i - f_n^j||).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+# A corner's place in its box: 0 lower left, then counter-clockwise. The columns are those of a box (x, y).
+_CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
+# The ceiling would make 1 of a rounding error of 1e-13: changes of force below this many units count as none.
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """The static objects of one lab, as boxes, and their corners (Sec. IV).
+
+    Parameters
+    ----------
+    boxes : (N, 4) array
+        xmin, ymin, xmax, ymax of each object in m. N may be 0: a lab with nothing in it is a fact to record, although
+        nothing can be matched with it or associated with it.
+
+    Raises
+    ------
+    ValueError
+        Where the shape is another, a number is not finite, or an extent is negative.
+
+    Examples
+    --------
+    The corners of a box run counter-clockwise from its lower left.
+
+    >>> Environment([[0, 0, 2, 1]]).corners.tolist()
+    [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]
+    """
+
+    boxes: np.ndarray
+
+    def __post_init__(self):
+        object.__setattr__(self, "boxes", _checked_boxes(self.boxes))
+
+    def __len__(self):
+        return len(self.boxes)
+
+    @cached_property
+    def corners(self):
+        """(4N, 2) array, m: corner k of object n in row 4n + k, counter-clockwise from the lower left."""
+        return self.boxes[:, _CORNER_COLUMNS].reshape(-1, 2)
+
+    @cached_property
+    def centres(self):
+        """(N, 2) array, m: the middle of each box."""
+        return (self.boxes[:, :2] + self.boxes[:, 2:]) / 2
+
+
+def _checked_boxes(boxes):
+    boxes = np.array(boxes, dtype=float)
+    if boxes.size == 0:
+        boxes = boxes.reshape(0, 4)
+    if boxes.ndim != 2 or boxes.shape[1] != 4:
+        raise ValueError(f"boxes must have the shape (N, 4), got {boxes.shape}")
+    if not np.isfinite(boxes).all():
+        number = np.flatnonzero(~np.isfinite(boxes).all(axis=1))[0]
+        raise ValueError(f"boxes must be finite, got {boxes[number].tolist()} for object {number}")
+    negative = (boxes[:, 2:] < boxes[:, :2]).any(axis=1)
+    if negative.any():
+        number = np.flatnonzero(negative)[0]
+        raise ValueError(
+            f"a box must have xmin <= xmax and ymin <= ymax, got {boxes[number].tolist()} for object {number}"
+        )
+    boxes.flags.writeable = False
+    return boxes
+
+
+def spring_constants(corners):
+    """The spring constants between all corners of one environment (Sec. IV-A).
+
+    Parameters
+    ----------
+    corners : (C, 2) array
+        Positions in m.
+
+    Returns
+    -------
+    (C, C) array
+        ||omega_m - omega_n||^-2 in 1/m², zero on the diagonal.
+
+    Raises
+    ------
+    ValueError
+        Where two corners coincide: their spring would be infinite.
+
+    Examples
+    --------
+    Twice as far, a quarter as strong.
+
+    >>> spring_constants([[0, 0], [1, 0], [2, 0]])[0].tolist()
+    [0.0, 1.0, 0.25]
+    """
+    return _springs(_differences(corners))
+
+
+def spring_forces(corners):
+    """The total force of the springs on each corner (Sec. IV-A).
+
+    Parameters
+    ----------
+    corners : (C, 2) array
+        Positions in m.
+
+    Returns
+    -------
+    (C, 2) array
+        f_m in 1/m².
+
+    Raises
+    ------
+    ValueError
+        Where two corners coincide.
+
+    Examples
+    --------
+    Springs pull in pairs: all forces together are none.
+
+    >>> bool(np.allclose(spring_forces([[0, 0], [1, 0], [3, 1]]).sum(axis=0), 0))
+    True
+    """
+    differences = _differences(corners)
+    # k_mn / ||omega_n - omega_m|| = k_mn^(3/2)
+    return np.matmul(_springs(differences)[:, None] ** 1.5, differences)[:, 0]
+
+
+def integer_costs(corners_i, corners_j, alpha=1e3):
+    """What matching each corner of one environment with each of another costs (Sec. IV-A).
+
+    Parameters
+    ----------
+    corners_i, corners_j : (C, 2) and (D, 2) arrays
+        Positions in m.
+    alpha : float
+        The paper's large constant (Sec. IV-A), in m².
+
+    Returns
+    -------
+    (C, D) int array
+        c_mn = ceil(alpha ||f_m^i - f_n^j||).
+
+    Raises
+    ------
+    ValueError
+        Where two corners of one environment coincide.
+    """
+    changes = spring_forces(corners_i)[:, None] - spring_forces(corners_j)
+    return np.ceil(alpha * np.hypot(changes[..., 0], changes[..., 1]) - _ROUNDING).astype(np.int64)
+
+
+def _differences(corners):
+    corners = np.asarray(corners, dtype=float)
+    return corners - corners[:, None]
+
+
+def _springs(differences):
+    squares = np.einsum("mnd,mnd->mn", differences, differences)
+    np.fill_diagonal(squares, np.inf)
+    if squares.min(initial=np.inf) == 0:
+        first, second = np.argwhere(squares == 0)[0]
+        raise ValueError(f"corners must not coincide (their spring is infinite), but {first} and {second} do")
+    return 1 / squares

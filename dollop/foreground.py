@@ -1,0 +1,309 @@
+"""Foreground objects: from laser scans to blobs and their centroids (Sec. II, after Fod et al. 2002).
+
+A reading with no background object near it is a foreground cell; cells are remembered autoregressively in a
+foreground grid; adjacent occupied cells are a blob; a blob that is large enough is a foreground object.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+EIGHT_CONNECTED = np.ones((3, 3), dtype=bool)
+
+
+@dataclass(frozen=True)
+class Blobs:
+    """Foreground objects of one moment: adjacent occupied cells that envelop enough area.
+
+    Attributes
+    ----------
+    centroids : (K, 2) float array
+        Mean of each blob's cell centres in m.
+    areas : (K,) float array
+        Enveloped area in m^2.
+    cells : (M, 2) int array
+        Row and column of every cell of the K blobs.
+    labels : (M,) int array
+        Which blob each cell belongs to, 0..K-1.
+    """
+
+    centroids: np.ndarray
+    areas: np.ndarray
+    cells: np.ndarray
+    labels: np.ndarray
+
+    def __len__(self):
+        return len(self.areas)
+
+
+def endpoints(log):
+    """World coordinates of every laser reading.
+
+    Parameters
+    ----------
+    log : LaserLog
+        T scans of B beams.
+
+    Returns
+    -------
+    (T, B, 2) float array
+        Metres; `nan` where nothing came back.
+    """
+    ranges = np.where(np.isfinite(log.ranges), log.ranges, np.nan)
+    bearings = log.poses[:, 2:] + log.angles
+    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+    return log.poses[:, None, :2] + ranges[..., None] * directions
+
+
+def foreground_mask(points, background, background_radius=0.20):
+    """Which readings the background map does not explain.
+
+    Parameters
+    ----------
+    points : (..., 2) float array
+        Readings in m, `nan` where nothing came back.
+    background : OccupancyGrid
+        The background occupancy grid map.
+    background_radius : float
+        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20 centimetres).
+
+    Returns
+    -------
+    (...) bool array
+
+    Raises
+    ------
+    ValueError
+        If more than a tenth of the readings lie outside the map, or the radius is not positive.
+    """
+    if not background_radius > 0:
+        raise ValueError(f"background_radius must be positive, got {background_radius}")
+    flat = points.reshape(-1, 2)
+    returned = np.isfinite(flat[:, 0])
+    covered = returned.copy()
+    covered[returned] = background.covers(flat[returned])
+    outside = returned.sum() - covered.sum()
+    if outside > 0.1 * returned.sum():
+        raise ValueError(
+            f"the background map must cover the scans: {outside} of {returned.sum()} readings "
+            f"({100 * outside / returned.sum():.0f} %) lie outside it"
+        )
+    mask = covered
+    mask[covered] = background.distance_at(flat[covered]) > background_radius
+    return mask.reshape(points.shape[:-1])
+
+
+def surface_points(points, mask, spacing=0.05, jump=0.30):
+    """Foreground readings, and the surface between readings of neighbouring beams.
+
+    Beams fan out: 5 m away one degree is 9 cm, more than a cell, and a torso would fall apart into separate blobs.
+    Two neighbouring foreground readings closer than `jump` lie on one surface, which is filled in between.
+
+    Parameters
+    ----------
+    points : (T, B, 2) float array
+        Readings in m.
+    mask : (T, B) bool array
+        Foreground readings.
+    spacing : float
+        Largest gap left on a surface, in m.
+    jump : float
+        Neighbouring readings farther apart than this, in m, are different surfaces.
+
+    Returns
+    -------
+    scan : (M,) int array
+        Scan of each point, ascending.
+    points : (M, 2) float array
+        Metres.
+    """
+    scan, beam = np.nonzero(mask)
+    readings = points[scan, beam]
+    step = np.diff(readings, axis=0)
+    gap = np.hypot(step[:, 0], step[:, 1])
+    joined = (np.diff(scan) == 0) & (np.diff(beam) == 1) & (gap < jump) & (gap > spacing)
+    pieces = int(np.ceil(jump / spacing))
+    fractions = np.arange(1, pieces) / pieces
+    between = readings[:-1][joined][:, None] + fractions[:, None] * step[joined][:, None]
+    scans = np.concatenate([scan, np.repeat(scan[:-1][joined], pieces - 1)])
+    order = np.argsort(scans, kind="stable")
+    return scans[order], np.concatenate([readings, between.reshape(-1, 2)])[order]
+
+
+def seen_free(points, pose, angles, ranges, margin=0.0):
+    """Whether the beam nearest in bearing to each point went on beyond it.
+
+    Parameters
+    ----------
+    points : (M, 2) float array
+        Metres.
+    pose : (3,) float array
+        Sensor x, y in m, theta in rad.
+    angles, ranges : (B,) float arrays
+        One scan: bearings in rad, ranges in m, `inf` where nothing came back.
+    margin : float
+        By how much the beam must have gone on, in m.
+
+    Returns
+    -------
+    (M,) bool array
+        False outside the field of view.
+    """
+    offset = points - pose[:2]
+    bearing = np.arctan2(offset[:, 1], offset[:, 0]) - pose[2]
+    bearing = (bearing + np.pi) % (2 * np.pi) - np.pi
+    beam = np.rint(np.interp(bearing, angles, np.arange(len(angles)), left=-1, right=-1)).astype(np.intp)
+    return (beam >= 0) & (ranges[beam] > np.hypot(offset[:, 0], offset[:, 1]) + margin)
+
+
+class ForegroundGrid:
+    """The foreground occupancy grid: a cell's value follows what the laser sees there, autoregressively (Sec. II).
+
+        g <- (1 - gain) g + gain * hit        for cells that were hit or that a beam passed through
+
+    Cells that no beam reached keep their value: what stands in the shadow of the user is not erased.
+
+    Parameters
+    ----------
+    background : OccupancyGrid
+        Gives origin, resolution and shape.
+    gain : float
+        Weight of the newest scan, in (0, 1]. A high gain follows a walker without dragging a tail; a low one
+        remembers what is static.
+    """
+
+    def __init__(self, background, gain):
+        if not 0 < gain <= 1:
+            raise ValueError(f"gain must lie in (0, 1], got {gain}")
+        self.gain = gain
+        self.shape = background.occupancy.shape
+        self.origin = np.asarray(background.origin[:2], dtype=float)
+        self.resolution = background.resolution
+        self.value = np.zeros(self.shape).ravel()
+        self.sensed = np.zeros(self.value.size, dtype=bool)
+        self._active = np.zeros(0, dtype=np.intp)
+
+    def update(self, hits, pose, angles, ranges):
+        """Take in one scan.
+
+        Parameters
+        ----------
+        hits : (M,) int array
+            Flat indices of the cells that hold a foreground reading; repeats allowed.
+        pose : (3,) float array
+            Sensor x, y in m, theta in rad.
+        angles, ranges : (B,) float arrays
+            The scan: bearings in rad, ranges in m, `inf` where nothing came back.
+        """
+        self.sensed[self._active] = False
+        self.sensed[hits] = True
+        fresh = hits[self.value[hits] == 0]
+        if len(fresh):
+            self._active = np.concatenate([self._active, np.unique(fresh)])
+        cells = self._active
+        hit = self.sensed[cells]
+        passed = ~hit & seen_free(self.centres(cells), pose, angles, ranges, self.resolution)
+        value = self.value[cells]
+        value = np.where(hit | passed, (1 - self.gain) * value + self.gain * hit, value)
+        value[value < 0.5 * self.gain] = 0.0
+        self.value[cells] = value
+        self._active = cells[value > 0]
+
+    def centres(self, cells):
+        """Centres (M, 2) in m of the cells with flat indices `cells` (M,)."""
+        row, column = np.divmod(cells, self.shape[1])
+        return self.origin + self.resolution * (np.column_stack([column, row]) + 0.5)
+
+    def blobs(self, threshold=0.5, min_area=0.01):
+        """Blobs of occupied cells, remembered ones included.
+
+        Parameters
+        ----------
+        threshold : float
+            A cell above it is occupied.
+        min_area : float
+            A blob must envelop at least this area, in m^2 (Sec. II: 100 square centimetres).
+
+        Returns
+        -------
+        Blobs
+        """
+        occupied = self._active[self.value[self._active] > threshold]
+        return find_blobs(np.column_stack(np.divmod(occupied, self.shape[1])), self.origin, self.resolution, min_area)
+
+    def objects(self, threshold=0.5, min_area=0.01):
+        """Centroids (K, 2) in m of the foreground objects that the last scan met.
+
+        Memory holds cells together that are one object; what it holds in the shadow is not where the object is now.
+        So the centroid is that of a blob's cells that were hit, and a blob with none is not sensed. Parameters as for
+        `blobs`.
+        """
+        blobs = self.blobs(threshold, min_area)
+        hit = self.sensed[blobs.cells @ [self.shape[1], 1]]
+        return blob_centroids(blobs.cells[hit], blobs.labels[hit], self.origin, self.resolution)
+
+
+def blob_centroids(cells, labels, origin, resolution):
+    """Mean (K, 2) in m of the cells (M, 2) of each blob that has any; labels (M,) from 0."""
+    size = np.bincount(labels)
+    rows, columns = (np.bincount(labels, cells[:, k])[size > 0] / size[size > 0] for k in (0, 1))
+    return origin + resolution * (np.column_stack([columns, rows]) + 0.5)
+
+
+def find_blobs(cells, origin, resolution, min_area=0.01):
+    """Group occupied cells into blobs and keep the large ones.
+
+    Parameters
+    ----------
+    cells : (M, 2) int array
+        Row and column of each occupied cell.
+    origin : (2,) float array
+        Lower left corner of the grid in m.
+    resolution : float
+        Metres per cell.
+    min_area : float
+        Smallest area of a foreground object in m^2 (Sec. II).
+
+    Returns
+    -------
+    Blobs
+    """
+    if len(cells) == 0:
+        return Blobs(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 2), int), np.zeros(0, int))
+    corner = cells.min(axis=0)
+    local = cells - corner
+    window = np.zeros(local.max(axis=0) + 1, dtype=bool)
+    window[local[:, 0], local[:, 1]] = True
+    labelled, count = ndimage.label(window, EIGHT_CONNECTED)
+    labels = labelled[local[:, 0], local[:, 1]] - 1
+    size = np.bincount(labels, minlength=count)
+    large = size * resolution**2 >= min_area - 1e-12
+    kept = large[labels]
+    labels, cells = (np.cumsum(large) - 1)[labels[kept]], cells[kept]
+    return Blobs(blob_centroids(cells, labels, origin, resolution), size[large] * resolution**2, cells, labels)
+
+
+def bounding_boxes(blobs, origin, resolution):
+    """Boxes enveloping each blob's cells.
+
+    Parameters
+    ----------
+    blobs : Blobs
+        K foreground objects.
+    origin : (2,) float array
+        Lower left corner of the grid in m.
+    resolution : float
+        Metres per cell.
+
+    Returns
+    -------
+    (K, 4) float array
+        xmin, ymin, xmax, ymax in m.
+    """
+    boxes = np.empty((len(blobs), 4))
+    for k in range(len(blobs)):
+        low = blobs.cells[blobs.labels == k].min(axis=0)
+        high = blobs.cells[blobs.labels == k].max(axis=0) + 1
+        boxes[k] = np.concatenate([origin + resolution * low[::-1], origin + resolution * high[::-1]])
+    return boxes

@@ -1,0 +1,288 @@
+"""A person walking a task: via-points that differ in every lap, a smooth path, a human speed, a swaying gait.
+
+The walk is made from geometry and noise, never from a dynamical system: what is later fitted to it is not what made it.
+Nothing here needs PyBullet.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+
+from dollop.lab.scenes import background_distance
+
+SHOULDERS = 0.45
+"""Width of the body across the shoulders in m."""
+DEPTH = 0.25
+"""Depth of the body from chest to back in m."""
+CLEARANCE = 0.10
+"""Least distance in m that a person keeps between shoulder and foreground object."""
+BACKGROUND_CLEARANCE = 0.30
+"""Least distance in m between shoulder and background: the background radius of Sec. II swallows what is nearer."""
+STRIDE_RATE = 0.9
+"""Strides (two steps) per second."""
+
+TIME_STEP = 0.02
+PATH_STEP = 0.02
+
+
+@dataclass(frozen=True)
+class Walk:
+    """Where the person is at which time.
+
+    Attributes
+    ----------
+    t : (N,) float array
+        Time in s from 0, evenly spaced.
+    positions : (N, 2) float array
+        Middle of the body in m.
+    headings : (N,) float array
+        Direction the chest points in, in rad, unwrapped.
+    phases : (N,) float array
+        Phase of the gait in rad: one stride is 2 pi, and the phase stands while the person stands.
+    """
+
+    t: np.ndarray
+    positions: np.ndarray
+    headings: np.ndarray
+    phases: np.ndarray
+
+    @property
+    def speeds(self):
+        """(N,) speed in m/s."""
+        return np.linalg.norm(np.gradient(self.positions, self.t, axis=0), axis=1)
+
+    def at(self, t):
+        """Position (2,), heading and gait phase at time `t` in s, held at the ends."""
+        columns = np.column_stack([self.positions, self.headings, self.phases])
+        x, y, heading, phase = (np.interp(t, self.t, column) for column in columns.T)
+        return np.array([x, y]), heading, phase
+
+
+def figure_eight(scene, seed, laps=5, first_turn="left", **gait):
+    """A walk in figure-eights round the first two objects of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its first two objects are walked round; all are kept clear of.
+    seed : int or numpy.random.Generator
+    laps : int
+        Figure-eights, each begun and ended midway between the objects.
+    first_turn : str
+        "left": counter-clockwise round the second object, then clockwise round the first; "right": the other way.
+    **gait
+        Keywords of `walk`.
+
+    Returns
+    -------
+    Walk
+
+    Raises
+    ------
+    ValueError
+        If the scene has fewer than two objects, `first_turn` is neither, or there is no room to walk.
+    """
+    if len(scene.kinds) < 2:
+        raise ValueError(f"a figure-eight needs two objects, the scene has {len(scene.kinds)}")
+    if first_turn not in ("left", "right"):
+        raise ValueError(f"first_turn must be 'left' or 'right', got {first_turn!r}")
+    rng = np.random.default_rng(seed)
+    turn = 1.0 if first_turn == "left" else -1.0
+    laps_points = [figure_eight_points(*scene.positions[:2], turn, rng) for _ in range(laps)]
+    end = scene.positions[:2].mean(axis=0) + rng.normal(0.0, 0.06, 2)
+    return walk(np.vstack([*laps_points, end]), scene, rng, **gait)
+
+
+LOBE_ANGLES = np.deg2rad([-110.0, -55.0, 0.0, 55.0, 110.0])
+
+
+def figure_eight_points(first, second, turn, rng, radius=1.22):
+    """Via-points of one lap: the middle, round `second`, the middle, round `first`; `turn` +1 is left first."""
+    middle, axis = (first + second) / 2, second - first
+    bearing = np.arctan2(axis[1], axis[0])
+
+    def lobe(centre, facing, sense):
+        angles = facing + sense * LOBE_ANGLES
+        spread = radius + rng.normal(0.0, 0.06) + rng.normal(0.0, 0.03, len(angles))
+        return centre + spread[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+
+    def crossing():
+        return middle + rng.normal(0.0, 0.06, 2)
+
+    out, back = lobe(second, bearing, turn), lobe(first, bearing + np.pi, -turn)
+    return np.vstack([crossing(), out, crossing(), back])
+
+
+def slalom(scene, seed, sides=None, approach=1.0, swing=0.75, **gait):
+    """A walk along the scene's objects in their order, past each on its given side.
+
+    Parameters
+    ----------
+    scene : Scene
+    seed : int or numpy.random.Generator
+    sides : sequence of N values +1 or -1, optional
+        +1 leaves the walker left of the object as seen along the row, -1 right of it; alternating when not given.
+    approach : float
+        Length in m walked before the first and after the last object.
+    swing : float
+        Distance in m at which the walker aims to pass an object's centre.
+    **gait
+        Keywords of `walk`.
+
+    Raises
+    ------
+    ValueError
+        If the scene has fewer than two objects, a side is neither +1 nor -1, or there is no room to walk.
+    """
+    objects = scene.positions
+    if len(objects) < 2:
+        raise ValueError(f"a slalom needs two objects or more, the scene has {len(objects)}")
+    sides = (-1.0) ** np.arange(len(objects)) if sides is None else np.asarray(sides, dtype=float)
+    if sides.shape != (len(objects),) or not np.all(np.abs(sides) == 1):
+        raise ValueError(f"sides must be {len(objects)} values of +1 or -1, got {sides.tolist()}")
+    rng = np.random.default_rng(seed)
+    along = np.gradient(objects, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    left = np.column_stack([-along[:, 1], along[:, 0]])
+    passing = objects + (sides * (swing + rng.normal(0.0, 0.04, len(objects))))[:, None] * left
+    start, end = objects[0] - approach * along[0], objects[-1] + approach * along[-1]
+    points = np.vstack([start, passing, end])
+    return walk(points + rng.normal(0.0, 0.04, points.shape), scene, rng, **gait)
+
+
+def walk(points, scene, seed, speed=1.05, drift=0.04, sway=0.02, stand=1.5):
+    """A human-like walk through via-points, keeping clear of the scene's objects.
+
+    Parameters
+    ----------
+    points : (K, 2) array
+        Via-points in m, two or more.
+    scene : Scene
+    seed : int or numpy.random.Generator
+    speed : float
+        Speed in m/s on a straight line; it falls in curves.
+    drift : float
+        Standard deviation in m of the slow lateral drift off the smooth path.
+    sway : float
+        Amplitude in m of the lateral sway with every stride.
+    stand : float
+        Time in s stood still before and after.
+
+    Returns
+    -------
+    Walk
+
+    Raises
+    ------
+    ValueError
+        If the walk comes nearer to the background than `BACKGROUND_CLEARANCE` beside the shoulder.
+    """
+    rng = np.random.default_rng(seed)
+    path = smooth_path(np.asarray(points, dtype=float))
+    path = path + normals(path) * wander(len(path), 1.5 / PATH_STEP, drift, rng)[:, None]
+    path = evenly(keep_clear(path, scene))
+    distance = travelled(speed_profile(path, speed, rng), stand)
+    positions, headings = along_path(path, distance)
+    phases = gait_phases(distance)
+    fade = np.clip(np.gradient(distance, TIME_STEP) / speed, 0.0, 1.0)
+    left = np.column_stack([-np.sin(headings), np.cos(headings)])
+    positions = keep_clear(positions + (sway * fade * np.sin(phases))[:, None] * left, scene)
+    check_room(positions)
+    return Walk(np.arange(len(positions)) * TIME_STEP, positions, headings, phases)
+
+
+def smooth_path(points):
+    """A spline through (K, 2) via-points, sampled every `PATH_STEP` m."""
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    knots = np.concatenate([[0.0], np.cumsum(np.sqrt(chords))])  # centripetal: no loops where points crowd
+    fine = np.linspace(0.0, knots[-1], 50 * len(points))
+    return evenly(CubicSpline(knots, points)(fine))
+
+
+def evenly(path, step=PATH_STEP):
+    """The path sampled again at even distances of about `step` m."""
+    arc = arc_length(path)
+    even = np.linspace(0.0, arc[-1], max(2, round(arc[-1] / step) + 1))
+    return np.column_stack([np.interp(even, arc, column) for column in path.T])
+
+
+def arc_length(path):
+    """Distance in m walked up to every point of a path."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+
+
+def normals(path):
+    """Unit vectors to the left of every point of a path."""
+    tangents = np.gradient(path, axis=0)
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    return np.column_stack([-tangents[:, 1], tangents[:, 0]])
+
+
+def wander(n, correlation, spread, rng):
+    """Gaussian noise with standard deviation `spread` and a correlation length of `correlation` samples."""
+    noise = gaussian_filter1d(rng.normal(size=n), correlation / 2, mode="reflect")
+    return spread * noise * np.sqrt(correlation * np.sqrt(np.pi))
+
+
+def keep_clear(points, scene, softness=0.03):
+    """The points pushed out of the circles in which a shoulder would touch an object, smoothly."""
+    points = np.array(points)
+    for centre, radius in zip(scene.positions, scene.foot_radii, strict=True):
+        away = points - centre
+        distance = np.linalg.norm(away, axis=1, keepdims=True)
+        lack = radius + SHOULDERS / 2 + CLEARANCE - distance
+        points += away / np.maximum(distance, 1e-9) * softness * np.logaddexp(0.0, lack / softness)
+    return points
+
+
+def speed_profile(path, speed, rng, bend=0.8, acceleration=0.7):
+    """Speed in m/s at every point of an evenly sampled path.
+
+    Curves are walked slower by the two-thirds power law of human movement, v ~ curvature^(-1/3) (Lacquaniti et al.,
+    1983), here speed * (1 + (curvature / bend)^2)^(-1/6) so that straight lines have a finite speed; fluctuations of
+    4 % that last metres are laid over it, and it starts and ends at rest within the `acceleration` in m/s^2.
+    """
+    step = arc_length(path)[1]
+    smooth = gaussian_filter1d(path, 0.2 / step, axis=0, mode="nearest")
+    headings = np.unwrap(np.arctan2(*np.gradient(smooth, axis=0).T[::-1]))
+    curvature = np.gradient(headings) / step
+    wish = speed * (1.0 + (curvature / bend) ** 2) ** (-1 / 6)
+    wish *= 1.0 + wander(len(path), 3.0 / step, 0.04, rng)
+    ends = np.minimum(np.arange(len(path)), np.arange(len(path))[::-1]) * step
+    return np.minimum(gaussian_filter1d(wish, 0.3 / step), np.sqrt(2 * acceleration * (ends + step / 10)))
+
+
+def travelled(speeds, stand):
+    """Distance in m at every time step when `speeds` hold along an evenly sampled path, standing before and after."""
+    speeds_between = (speeds[1:] + speeds[:-1]) / 2
+    times = np.concatenate([[0.0], np.cumsum(PATH_STEP / speeds_between)]) + stand
+    t = np.arange(0.0, times[-1] + stand, TIME_STEP)
+    return gaussian_filter1d(np.interp(t, times, np.arange(len(speeds)) * PATH_STEP), 0.15 / TIME_STEP, mode="nearest")
+
+
+def along_path(path, distance):
+    """Positions (N, 2) and smoothed headings (N,) at the given distances along an evenly sampled path."""
+    arc = np.arange(len(path)) * PATH_STEP
+    smooth = gaussian_filter1d(path, 0.15 / PATH_STEP, axis=0, mode="nearest")
+    headings = np.unwrap(np.arctan2(*np.gradient(smooth, axis=0).T[::-1]))
+    return np.column_stack([np.interp(distance, arc, column) for column in path.T]), np.interp(distance, arc, headings)
+
+
+def gait_phases(distance):
+    """Gait phase in rad: strides come faster and grow longer with speed, as the square root of it each."""
+    speeds = np.clip(np.gradient(distance, TIME_STEP), 0.0, None)
+    return np.cumsum(2 * np.pi * STRIDE_RATE * np.sqrt(speeds) * TIME_STEP)
+
+
+def check_room(positions):
+    """Raise ValueError where a walk comes too near to the background."""
+    room = background_distance(positions) - SHOULDERS / 2
+    nearest = np.argmin(room)
+    if room[nearest] < BACKGROUND_CLEARANCE:
+        place = np.round(positions[nearest], 2).tolist()
+        raise ValueError(
+            f"a walk must keep {BACKGROUND_CLEARANCE} m between shoulder and background, "
+            f"got {room[nearest]:.2f} m at {place}"
+        )

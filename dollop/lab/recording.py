@@ -1,0 +1,94 @@
+"""A recording: what the laser saw, and beside it the truth that only the error is measured with.
+
+On disk: a CARMEN log, the truth as CSV, the scene as JSON. Nothing here needs PyBullet.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from dollop.files import FormatError, whole_file
+from dollop.lab.scenes import Scene
+from dollop.laser import LaserLog
+from dollop.logs import read_log, write_log
+
+TRUTH_COLUMNS = ["t", "x", "y", "heading"]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A demonstration as recorded in the laboratory.
+
+    Attributes
+    ----------
+    log : LaserLog
+        T scans from the standing robot.
+    truth : pandas.DataFrame
+        The walker at each scan: t in s, x and y in m, heading in rad.
+    scene : Scene
+        What stood where.
+    """
+
+    log: LaserLog
+    truth: pd.DataFrame
+    scene: Scene
+
+    def save(self, path):
+        """Write `path` (a CARMEN log: .log or .log.gz), and beside it the truth and the scene.
+
+        Parameters
+        ----------
+        path : str or Path
+            For `walk.log.gz` the others are `walk_truth.csv` and `walk_scene.json`.
+        """
+        write_log(path, self.log)
+        truth, scene = companions(path)
+        with whole_file(truth, "w") as stream:
+            self.truth.to_csv(stream, index=False, float_format="%.4f")
+        with whole_file(scene, "w") as stream:
+            json.dump(self.scene.to_dict(), stream, indent=1)
+
+    @classmethod
+    def load(cls, path):
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        FormatError
+            If a file is not what it should be, or the truth has not one line for each scan.
+        """
+        log = read_log(path)
+        truth_path, scene_path = companions(path)
+        return cls(log, load_truth(truth_path, len(log)), load_scene(scene_path))
+
+
+def load_truth(path, n_scans):
+    """Read the walker's true states, one line for each of `n_scans` scans."""
+    try:
+        truth = pd.read_csv(path, dtype=float)
+    except ValueError as error:
+        raise FormatError(f"not a table of numbers: {error}", path) from error
+    if list(truth.columns) != TRUTH_COLUMNS or len(truth) != n_scans:
+        raise FormatError(
+            f"columns must be {TRUTH_COLUMNS} and rows {n_scans}, one for each scan, "
+            f"got {list(truth.columns)} and {len(truth)}",
+            path,
+        )
+    return truth
+
+
+def load_scene(path):
+    """Read a scene from JSON."""
+    try:
+        return Scene(**json.loads(Path(path).read_text()))
+    except (TypeError, ValueError) as error:
+        raise FormatError(f"not a scene: {error}", path) from error
+
+
+def companions(path):
+    """Where the truth and the scene of the log at `path` lie."""
+    path = Path(path)
+    stem = Path(path.name.removesuffix(".gz")).stem
+    return path.with_name(f"{stem}_truth.csv"), path.with_name(f"{stem}_scene.json")

@@ -1,0 +1,64 @@
+"""Laser logs by file name: CARMEN or ROS."""
+
+from pathlib import Path
+
+from dollop import carmen
+from dollop.files import FormatError
+
+CARMEN_SUFFIXES = (".log", ".log.gz", ".clf", ".clf.gz")
+ROS_SUFFIXES = (".bag", ".mcap", ".db3")
+
+
+def read_log(path, topic=None):
+    """Read a laser log, in the format that its name says.
+
+    Parameters
+    ----------
+    path : str or Path
+        `.log`, `.log.gz`, `.clf`: a CARMEN log (`dollop.carmen.read_log`); `.bag`, `.mcap` or the folder of a ROS 2
+        bag: a ROS bag (`dollop.rosbag.read_log`, which needs the extra `ros`).
+    topic : str, optional
+        Which topic of a ROS bag; needed only if several carry laser scans.
+
+    Returns
+    -------
+    LaserLog
+
+    Raises
+    ------
+    FormatError
+        If the file is not what its name says, or the name says nothing.
+    FileNotFoundError
+        If there is no such file.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"no such file: {path}")
+    if path.is_dir() or path.name.endswith(ROS_SUFFIXES):
+        from dollop import rosbag
+
+        return rosbag.read_log(path, topic)
+    _check_is_carmen(path)
+    if topic is not None:
+        raise ValueError(f"a CARMEN log has no topics, got topic={topic!r}")
+    return carmen.read_log(path)
+
+
+def write_log(path, log):
+    """Write a laser log as CARMEN text.
+
+    Parameters
+    ----------
+    path : str or Path
+        `.log` or `.clf`, with `.gz` to have it packed; the file appears whole or not at all.
+    log : LaserLog
+        The scans, with evenly spaced beams.
+    """
+    _check_is_carmen(Path(path))
+    carmen.write_log(path, log)
+
+
+def _check_is_carmen(path):
+    if not path.name.endswith(CARMEN_SUFFIXES):
+        carmen_names, ros_names = ", ".join(CARMEN_SUFFIXES), ", ".join(ROS_SUFFIXES)
+        raise FormatError(f"a CARMEN log is named {carmen_names}, a ROS bag {ros_names}", path)

@@ -1,0 +1,162 @@
+"""Observing the user: from a laser log and a background map to tracks, the user and the environment (Fig. 4)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dollop.environment import Environment
+from dollop.foreground import (
+    ForegroundGrid,
+    bounding_boxes,
+    endpoints,
+    foreground_mask,
+    seen_free,
+    surface_points,
+)
+from dollop.tracking import Track, Tracker, identify_user, track_objects, user_track
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What Dollop has seen.
+
+    Attributes
+    ----------
+    tracks : tuple of Track
+        Every foreground object, as tracked from scan to scan.
+    user : Track or None
+        The user's trajectory, joined over losses and smoothed; None if nobody moved.
+    environment : Environment
+        Boxes of the static foreground objects.
+    losses : int
+        How often the user was lost and found again as another track.
+    """
+
+    tracks: tuple
+    user: Track
+    environment: Environment
+    losses: int
+
+
+def observe(
+    log,
+    background,
+    background_radius=0.20,
+    gain=0.6,
+    static_gain=0.02,
+    min_area=0.01,
+    tracker=None,
+    seed=0,
+):
+    """Observe a demonstration with the laser (Sec. II).
+
+    Parameters
+    ----------
+    log : LaserLog
+        The scans.
+    background : OccupancyGrid
+        The background occupancy grid map of the workspace; it must cover the scans.
+    background_radius : float
+        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20 centimetres).
+    gain, static_gain : float
+        Autoregressive gain per scan of the foreground grid that is tracked, and of the slow one that remembers
+        static objects: a walker wants no tail, a trash can wants patience.
+    min_area : float
+        Smallest foreground object in m^2 (Sec. II: 100 square centimetres).
+    tracker : Tracker, optional
+        How objects are tracked; the paper's choices by default.
+    seed : int or Generator
+        Only for particles.
+
+    Returns
+    -------
+    Observation
+
+    Raises
+    ------
+    ValueError
+        If the map does not cover the scans or a parameter is out of its range.
+    """
+    tracker = tracker or Tracker()
+    moving, static = ForegroundGrid(background, gain), ForegroundGrid(background, static_gain)
+    objects = []
+    for i, hits in enumerate(foreground_hits(log, background, background_radius)):
+        scan = hits, log.poses[i], log.angles, log.ranges[i]
+        moving.update(*scan)
+        static.update(*scan)
+        objects.append(moving.objects(min_area=min_area))
+
+    def visible(i, points):
+        return seen_free(points, log.poses[i], log.angles, log.ranges[i])
+
+    tracks = track_objects(log.t, objects, tracker, visible, seed)
+    users = identify_user(log.t, tracks)
+    user = user_track(log.t, tracks, users, tracker.motion)
+    boxes = static_boxes(static, log.poses[-1, :2], user, min_area)
+    losses = max(0, np.count_nonzero(np.diff(users, prepend=-1)) - 1)
+    return Observation(tracks, user, Environment(boxes), losses)
+
+
+def foreground_hits(log, background, background_radius=0.20):
+    """Foreground cells of every scan.
+
+    Returns
+    -------
+    list of T int arrays
+        Flat indices into the grid of `background`.
+    """
+    points = endpoints(log)
+    mask = foreground_mask(points, background, background_radius)
+    scan, on_surface = surface_points(points, mask, spacing=background.resolution)
+    rows, columns = background.occupancy.shape
+    cell = np.floor((on_surface - np.asarray(background.origin[:2])) / background.resolution).astype(np.intp)
+    inside = ((cell >= 0) & (cell < [columns, rows])).all(axis=1)
+    flat = cell[inside, 1] * columns + cell[inside, 0]
+    return np.split(flat, np.searchsorted(scan[inside], np.arange(1, len(log.t))))
+
+
+def static_boxes(grid, sensor, user=None, min_area=0.01, recent=1.0):
+    """Boxes of the static foreground objects in the slow foreground grid (Sec. IV).
+
+    A laser sees the near side only, and a trash can would be half as deep as it is wide. Each box is completed away
+    from the sensor to be at least as deep along the line of sight as it is wide across it.
+
+    Parameters
+    ----------
+    grid : ForegroundGrid
+        The slow grid after the last scan.
+    sensor : (2,) float array
+        Where the objects were seen from, in m.
+    user : Track, optional
+        Blobs where the user stood in the last `recent` seconds are the user, not objects.
+    min_area : float
+        m^2.
+    recent : float
+        s.
+
+    Returns
+    -------
+    (N, 4) float array
+        xmin, ymin, xmax, ymax in m.
+    """
+    blobs = grid.blobs(min_area=min_area)
+    boxes = bounding_boxes(blobs, grid.origin, grid.resolution)
+    for k in range(len(blobs)):
+        cells = blobs.cells[blobs.labels == k]
+        boxes[k] = completed(boxes[k], grid.centres(cells @ [grid.shape[1], 1]), sensor, grid.resolution)
+    if user is None:
+        return boxes
+    last = user.positions[user.t > user.t[-1] - recent]
+    inside = (last[:, None] >= boxes[:, :2] - grid.resolution) & (last[:, None] <= boxes[:, 2:] + grid.resolution)
+    return boxes[~inside.all(axis=2).any(axis=0)]
+
+
+def completed(box, seen, sensor, resolution):
+    """Extend `box` (4,) so that it is as deep along the line of sight as the cells `seen` (M, 2) are wide across it."""
+    sight = seen.mean(axis=0) - sensor
+    sight = sight / np.hypot(*sight)
+    along, across = (seen - sensor) @ sight, (seen - sensor) @ np.array([-sight[1], sight[0]])
+    half = (np.ptp(across) + resolution) / 2
+    middle = np.array([along.min() - resolution / 2 + half, (across.min() + across.max()) / 2])
+    centre = sensor + middle[0] * sight + middle[1] * np.array([-sight[1], sight[0]])
+    return np.concatenate([np.minimum(box[:2], centre - half), np.maximum(box[2:], centre + half)])

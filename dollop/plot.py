@@ -1,0 +1,95 @@
+"""The drawing vocabulary: one colour per meaning, the plane in metres, used by figures and notebooks alike.
+
+Colours are from Okabe and Ito's palette, which colour-blind readers can tell apart; red boxes, green law and yellow
+robot are also the paper's.
+"""
+
+from contextlib import contextmanager
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.patches import Circle, Rectangle
+
+USER = "#0072B2"  # blue: the user's track
+OBSTACLE = "#D55E00"  # vermilion: boxes of foreground objects
+ROBOT = "#F0E442"  # yellow: the robot
+LAW = "#009E73"  # green: the control law and its response
+SUBGOAL = "#000000"
+RUN = "#CC79A7"  # purple: where the robot went
+OCCLUDED = "#E69F00"  # orange: predictions while the user is occluded
+BACKGROUND = "#8C8C8C"
+TRUTH = "#56B4E9"
+
+STYLE = {
+    "figure.dpi": 100,
+    "savefig.dpi": 150,
+    "figure.constrained_layout.use": True,
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+}
+
+
+@contextmanager
+def style():
+    """House style for everything drawn inside the `with` block."""
+    with plt.rc_context(STYLE):
+        yield
+
+
+def plane(ax=None, title=None):
+    """Axes for the plane: metres, equal aspect."""
+    ax = ax or plt.gca()
+    ax.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    if title:
+        ax.set_title(title)
+    return ax
+
+
+def grid_map(ax, grid, colour=BACKGROUND):
+    """Occupied cells of an OccupancyGrid."""
+    rows, columns = grid.occupancy.shape
+    x, y = grid.origin[:2]
+    extent = (x, x + columns * grid.resolution, y, y + rows * grid.resolution)
+    image = np.ma.masked_where(~grid.occupied, np.ones(grid.occupancy.shape))
+    ax.imshow(image, origin="lower", extent=extent, cmap=plt.matplotlib.colors.ListedColormap([colour]))
+
+
+def boxes(ax, boxes, label=None, colour=OBSTACLE, **kwargs):
+    """Boxes (N, 4): xmin, ymin, xmax, ymax in m."""
+    kwargs = {"fill": False, "edgecolor": colour, "linewidth": 2} | kwargs
+    for k, (x0, y0, x1, y1) in enumerate(boxes):
+        ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, label=label if k == 0 else None, **kwargs))
+
+
+def robot(ax, pose, radius=0.25, label=None):
+    """The robot at pose (x, y, theta): a yellow circle with its heading."""
+    x, y, theta = pose
+    ax.add_patch(Circle((x, y), radius, facecolor=ROBOT, edgecolor="black", zorder=4, label=label))
+    ax.plot([x, x + radius * np.cos(theta)], [y, y + radius * np.sin(theta)], color="black", zorder=5)
+
+
+def path(ax, positions, label=None, colour=USER, **kwargs):
+    """A path (N, 2) in m."""
+    kwargs = {"linewidth": 1} | kwargs
+    ax.plot(*np.asarray(positions).T[:2], color=colour, label=label, **kwargs)
+
+
+def subgoals(ax, subgoals, label="subgoals"):
+    """Crosses at the subgoals (K, 2)."""
+    ax.plot(*np.asarray(subgoals).T, "x", color=SUBGOAL, markersize=9, markeredgewidth=2.5, zorder=6, label=label)
+
+
+def scan(ax, log, i, label="laser scan"):
+    """Scan i of a LaserLog in the world: rays, and points where something came back."""
+    x, y, theta = log.poses[i]
+    back = np.isfinite(log.ranges[i])
+    reach = np.where(back, log.ranges[i], log.max_range)
+    ends = np.column_stack([x + reach * np.cos(theta + log.angles), y + reach * np.sin(theta + log.angles)])
+    ax.plot(
+        *np.stack([np.broadcast_to([x, y], ends.shape), ends], axis=1)[back].transpose(2, 1, 0),
+        color=TRUTH,
+        linewidth=0.3,
+    )
+    ax.plot(*ends[back].T, ".", color="black", markersize=3, label=label)

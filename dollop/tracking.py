@@ -1,0 +1,431 @@
+"""Tracking foreground objects through time, and which of them is the user (Sec. II).
+
+The state of a track is its position and velocity (and, selectable, acceleration) in the plane, moved by white noise
+on the highest derivative. Both axes share one covariance, so a track of order n carries n x 2 means and one n x n
+covariance:
+
+    x <- F x,          P <- F P F^T + Q              (prediction over dt)
+    K = P h / (h^T P h + r),   x <- x + K (z - h^T x),   P <- P - K h^T P        (Kalman update, h picks the position)
+"""
+
+from dataclasses import dataclass
+from math import factorial
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+
+@dataclass(frozen=True)
+class Track:
+    """The path of one foreground object.
+
+    Attributes
+    ----------
+    t : (N,) float array
+        Time of each scan it lived through, in s.
+    positions : (N, 2) float array
+        Kalman estimate of its position in m.
+    velocities : (N, 2) float array
+        Kalman estimate of its velocity in m/s.
+    occluded : (N,) bool array
+        Where no foreground object was matched and the estimate is a prediction.
+    measurements : (N, 2) float array
+        The matched centroid in m, `nan` where occluded.
+    """
+
+    t: np.ndarray
+    positions: np.ndarray
+    velocities: np.ndarray
+    occluded: np.ndarray
+    measurements: np.ndarray
+
+    def __len__(self):
+        return len(self.t)
+
+    @property
+    def speeds(self):
+        """Speed (N,) in m/s."""
+        return np.hypot(self.velocities[:, 0], self.velocities[:, 1])
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a foreground object is assumed to move, and how well its centroid is measured.
+
+    Attributes
+    ----------
+    order : int
+        2: position and velocity (Sec. II, the paper's choice); 3: acceleration as well.
+    noise : float
+        Spectral density of the white noise on the highest derivative, m^2/s^(2 order - 1).
+    measurement_sd : float
+        Standard deviation of a centroid per axis in m. It is the body's near side that is measured, so this is
+        centimetres, not the laser's millimetres.
+    """
+
+    order: int = 2
+    noise: float = 0.5
+    measurement_sd: float = 0.06
+
+    def __post_init__(self):
+        if self.order not in (2, 3):
+            raise ValueError(f"order must be 2 (velocity) or 3 (acceleration), got {self.order}")
+        for name in ("noise", "measurement_sd"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+
+    def transition(self, dt):
+        """F (n, n) and Q (n, n) over `dt` seconds: integrated white noise (Bar-Shalom et al. 2001, Sec. 6.2)."""
+        n = self.order
+        F = np.array([[dt ** (j - i) / factorial(j - i) if j >= i else 0.0 for j in range(n)] for i in range(n)])
+        Q = np.empty((n, n))
+        for i in range(n):
+            for j in range(n):
+                power = 2 * n - 1 - i - j
+                Q[i, j] = dt**power / (power * factorial(n - 1 - i) * factorial(n - 1 - j))
+        return F, self.noise * Q
+
+    def birth(self, positions):
+        """Means (K, n, 2) and covariances (K, n, n) of objects first seen at `positions` (K, 2), velocity unknown."""
+        means = np.zeros((len(positions), self.order, 2))
+        means[:, 0] = positions
+        return means, np.tile(np.diag([self.measurement_sd**2, 1.0, 1.0][: self.order]), (len(positions), 1, 1))
+
+
+def predict(means, covariances, F, Q):
+    """Kalman prediction of K tracks: means (K, n, 2), covariances (K, n, n)."""
+    return F @ means, F @ covariances @ F.T + Q
+
+
+def update(means, covariances, measurements, measurement_sd):
+    """Kalman update of K tracks with one position (K, 2) each; returns means (K, n, 2), covariances (K, n, n)."""
+    gain = covariances[:, :, 0] / (covariances[:, 0, 0] + measurement_sd**2)[:, None]
+    innovation = measurements - means[:, 0]
+    means = means + gain[:, :, None] * innovation[:, None]
+    covariances = covariances - gain[:, :, None] * covariances[:, None, 0, :]
+    return means, covariances
+
+
+def match_greedily(cost, gate):
+    """Match tracks to objects, nearest pair first (Sec. II: "a greedy search").
+
+    Parameters
+    ----------
+    cost : (K, M) float array
+        Cost of giving object m to track k.
+    gate : float
+        Pairs that cost more are not matched.
+
+    Returns
+    -------
+    tracks, objects : (L,) int arrays
+        The matched pairs.
+    """
+    tracks, objects = [], []
+    open_cost = np.where(cost <= gate, cost, np.inf)
+    while open_cost.size and np.isfinite(best := open_cost.min()):
+        k, m = np.argwhere(open_cost == best)[0]
+        tracks.append(k)
+        objects.append(m)
+        open_cost[k, :] = open_cost[:, m] = np.inf
+    return np.array(tracks, int), np.array(objects, int)
+
+
+def match_jointly(cost, gate):
+    """Match tracks to objects with the least total cost (the paper's "joint optimization procedure").
+
+    As many pairs within the gate as possible would be wrong: leaving a track unmatched costs `gate`.
+    Same parameters and result as `match_greedily`.
+    """
+    if not cost.size:
+        return np.zeros(0, int), np.zeros(0, int)
+    tracks, objects = linear_sum_assignment(np.minimum(cost, gate))
+    within = cost[tracks, objects] <= gate
+    return tracks[within], objects[within]
+
+
+MATCHERS = {"greedy": match_greedily, "joint": match_jointly}
+
+
+@dataclass(frozen=True)
+class Tracker:
+    """The choices of Sec. II, the paper's as defaults.
+
+    Attributes
+    ----------
+    motion : Motion
+        Position and velocity by default.
+    matching : str
+        "greedy" (the paper) or "joint" (Hungarian).
+    occlusion : str
+        How an occluded object moves on: "kalman" (the paper: in a straight line) or "particles".
+    gate : float
+        Largest distance between prediction and object in standard deviations of their difference; it therefore grows
+        while an object is occluded.
+    gate_min : float
+        The gate is never narrower than this, in m.
+    disappear_after : float
+        Occluded for longer than this, in s, is disappeared (Sec. II: 5 seconds).
+    """
+
+    motion: Motion = Motion()
+    matching: str = "greedy"
+    occlusion: str = "kalman"
+    gate: float = 3.0
+    gate_min: float = 0.5
+    disappear_after: float = 5.0
+
+    def __post_init__(self):
+        if self.matching not in MATCHERS:
+            raise ValueError(f"matching must be one of {sorted(MATCHERS)}, got {self.matching!r}")
+        if self.occlusion not in ("kalman", "particles"):
+            raise ValueError(f"occlusion must be 'kalman' or 'particles', got {self.occlusion!r}")
+        for name in ("gate", "gate_min", "disappear_after"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+
+
+def track_objects(t, objects, tracker=None, visible=None, seed=0):
+    """Follow foreground objects from scan to scan.
+
+    Parameters
+    ----------
+    t : (T,) float array
+        Time of each scan in s, increasing.
+    objects : sequence of T (M_i, 2) float arrays
+        Centroids of the foreground objects in each scan, in m.
+    tracker : Tracker, optional
+        The choices of Sec. II.
+    visible : callable, optional
+        visible(i, points (M, 2)) -> (M,) bool: could the laser have seen an object there in scan i? Used by particles.
+    seed : int or Generator
+        For the particles.
+
+    Returns
+    -------
+    tuple of Track
+        In the order of their birth, each from its first sight until its last.
+    """
+    tracker = tracker or Tracker()
+    state = _Tracks(tracker, np.random.default_rng(seed))
+    intervals = np.diff(t, prepend=t[0])
+    transitions = {dt: tracker.motion.transition(dt) for dt in np.unique(intervals)}
+    for i, dt in enumerate(intervals):
+        state.predict(*transitions[dt], None if visible is None else lambda points, i=i: visible(i, points))
+        state.match(objects[i], t[i])
+        state.note(i)
+    return state.tracks(t)
+
+
+class _Tracks:
+    """The tracks alive now, as arrays over K tracks, and the diary of all that have lived."""
+
+    def __init__(self, tracker, rng):
+        self.tracker, self.rng = tracker, rng
+        self.means, self.covariances = tracker.motion.birth(np.zeros((0, 2)))
+        self.measured = np.zeros((0, 2))
+        self.seen = np.zeros(0)
+        self.name = np.zeros(0, int)
+        self.born = 0
+        self.particles = {}
+        self.diary = []
+
+    def predict(self, F, Q, visible):
+        """Kalman prediction; occluded tracks by particles where that was chosen."""
+        occluded = np.isnan(self.measured[:, 0])
+        before = self.means, self.covariances
+        self.means, self.covariances = predict(*before, F, Q)
+        if self.tracker.occlusion == "particles":
+            for k in np.flatnonzero(occluded):
+                cloud = self.particles.get(self.name[k])
+                if cloud is None:
+                    cloud = draw_particles(before[0][k], before[1][k], self.rng)
+                cloud = move_particles(cloud, F, Q, self.rng, visible)
+                self.means[k], self.covariances[k] = particle_moments(cloud)
+                self.particles[self.name[k]] = cloud
+
+    def match(self, objects, now):
+        """Match predictions to `objects` (M, 2), update, let the unmatched be occluded, disappear or be born."""
+        tracker, motion = self.tracker, self.tracker.motion
+        offset = self.means[:, None, 0] - objects[None]
+        sd = np.sqrt(self.covariances[:, 0, 0] + motion.measurement_sd**2)
+        scale = np.maximum(sd, tracker.gate_min / tracker.gate)
+        cost = np.hypot(offset[..., 0], offset[..., 1]) / scale[:, None]
+        matched, found = MATCHERS[tracker.matching](cost, tracker.gate)
+        self.measured = np.full((len(self.means), 2), np.nan)
+        self.measured[matched] = objects[found]
+        self.means[matched], self.covariances[matched] = update(
+            self.means[matched], self.covariances[matched], objects[found], motion.measurement_sd
+        )
+        self.seen[matched] = now
+        for name in self.name[matched]:
+            self.particles.pop(name, None)
+        self._keep(now - self.seen <= tracker.disappear_after)
+        self._bear(np.delete(objects, found, axis=0), now)
+
+    def _keep(self, alive):
+        if not alive.all():
+            self.means, self.covariances = self.means[alive], self.covariances[alive]
+            self.measured, self.seen, self.name = self.measured[alive], self.seen[alive], self.name[alive]
+
+    def _bear(self, objects, now):
+        if len(objects):
+            means, covariances = self.tracker.motion.birth(objects)
+            self.means = np.concatenate([self.means, means])
+            self.covariances = np.concatenate([self.covariances, covariances])
+            self.measured = np.concatenate([self.measured, objects])
+            self.seen = np.concatenate([self.seen, np.full(len(objects), now)])
+            self.name = np.concatenate([self.name, self.born + np.arange(len(objects))])
+            self.born += len(objects)
+
+    def note(self, i):
+        self.diary.append((self.name, np.full(len(self.name), i), self.means[:, :2].copy(), self.measured))
+
+    def tracks(self, t):
+        """Every track that lived, cut after it was last seen."""
+        name, scan, means, measured = (np.concatenate(column) for column in zip(*self.diary, strict=True))
+        order = np.argsort(name, kind="stable")
+        tracks = []
+        for rows in np.split(order, np.flatnonzero(np.diff(name[order])) + 1) if len(order) else []:
+            seen = np.flatnonzero(np.isfinite(measured[rows, 0]))
+            rows = rows[: seen[-1] + 1]
+            position, velocity = means[rows, 0], means[rows, 1]
+            tracks.append(Track(t[scan[rows]], position, velocity, np.isnan(measured[rows, 0]), measured[rows]))
+        return tuple(tracks)
+
+
+def draw_particles(mean, covariance, rng, count=200):
+    """Draw `count` particles (count, n, 2) from one track's mean (n, 2) and covariance (n, n)."""
+    return mean + np.linalg.cholesky(covariance) @ rng.standard_normal((count, *mean.shape))
+
+
+def move_particles(particles, F, Q, rng, visible=None):
+    """Move particles (P, n, 2) by the motion model; those that the laser would have seen die and are redrawn."""
+    moved = F @ particles + np.linalg.cholesky(Q) @ rng.standard_normal(particles.shape)
+    if visible is not None:
+        hidden = np.flatnonzero(~visible(moved[:, 0]))
+        if len(hidden):
+            moved = moved[rng.choice(hidden, len(moved))]
+    return moved
+
+
+def particle_moments(particles):
+    """Mean (n, 2) and the covariance (n, n) that both axes share, of particles (P, n, 2)."""
+    mean = particles.mean(axis=0)
+    spread = particles - mean
+    return mean, np.einsum("pia,pja->ij", spread, spread) / (2 * len(particles)) + 1e-9 * np.eye(len(mean))
+
+
+def smooth(t, measurements, motion=None):
+    """Kalman filter forwards, Rauch-Tung-Striebel smoother backwards.
+
+    Parameters
+    ----------
+    t : (N,) float array
+        Seconds, increasing.
+    measurements : (N, 2) float array
+        Centroids in m, `nan` where the object was occluded; the first must be finite.
+    motion : Motion, optional
+        The motion model.
+
+    Returns
+    -------
+    positions, velocities : (N, 2) float arrays
+        m and m/s.
+    """
+    motion = motion or Motion()
+    means, covariances = motion.birth(measurements[:1])
+    predicted, filtered, transitions = [], [(means, covariances)], []
+    for dt, z in zip(np.diff(t), measurements[1:], strict=True):
+        F, Q = motion.transition(dt)
+        means, covariances = predict(means, covariances, F, Q)
+        predicted.append((means, covariances))
+        transitions.append(F)
+        if np.isfinite(z[0]):
+            means, covariances = update(means, covariances, z[None], motion.measurement_sd)
+        filtered.append((means, covariances))
+    smoothed = [means[0]]
+    for (ahead, ahead_cov), (mean, cov), F in zip(predicted[::-1], filtered[-2::-1], transitions[::-1], strict=True):
+        G = np.linalg.solve(ahead_cov[0], F @ cov[0]).T
+        smoothed.append(mean[0] + G @ (smoothed[-1] - ahead[0]))
+    states = np.array(smoothed[::-1])
+    return states[:, 0], states[:, 1]
+
+
+def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):
+    """Which track is the user at each moment: the fastest foreground object (Sec. II), with hysteresis.
+
+    Occluded objects keep their velocity, so only visible ones count as fast; and another one takes over only after
+    it has been faster by `faster` m/s for `patience` s, or the choice would flicker between ghosts.
+
+    Parameters
+    ----------
+    t : (T,) float array
+        Time of each scan in s.
+    tracks : sequence of K Track
+        Every track.
+    faster : float
+        m/s.
+    patience : float
+        s.
+    min_age : float
+        A track's velocity means nothing before it has lived this long, in s.
+
+    Returns
+    -------
+    (T,) int array
+        Index into `tracks`, -1 while nobody has moved yet.
+    """
+    speed = np.zeros((len(t), len(tracks)))
+    for k, track in enumerate(tracks):
+        rows = np.searchsorted(t, track.t)
+        speed[rows, k] = np.where(track.occluded | (track.t - track.t[0] < min_age), 0.0, track.speeds)
+    user, since, rival = -1, np.inf, -1
+    users = np.empty(len(t), int)
+    fastest = speed.argmax(axis=1) if len(tracks) else np.full(len(t), -1)
+    for i, best in enumerate(fastest):
+        leads = best >= 0 and best != user and speed[i, best] > faster + (speed[i, user] if user >= 0 else 0.0)
+        if not leads or best != rival:
+            since, rival = (t[i], best) if leads else (np.inf, -1)
+        elif t[i] - since >= patience:
+            user, since, rival = best, np.inf, -1
+        users[i] = user
+    return users
+
+
+def user_track(t, tracks, users, motion=None):
+    """The user's whole trajectory: the tracks that were the user, joined and smoothed.
+
+    Each takes over right after the one before it was last seen, so what a new track saw before it was recognised as
+    the user counts too.
+
+    Parameters
+    ----------
+    t : (T,) float array
+        Time of each scan in s.
+    tracks : sequence of Track
+        Every track.
+    users : (T,) int array
+        From `identify_user`.
+    motion : Motion, optional
+        For the smoother.
+
+    Returns
+    -------
+    Track or None
+        None if nobody moved.
+    """
+    changes = np.flatnonzero(np.diff(users, prepend=-1))
+    measurements = np.full((len(t), 2), np.nan)
+    for start, k in zip(changes, users[changes], strict=True):
+        seen = np.flatnonzero(np.isfinite(measurements[:start, 0]))
+        join = seen[-1] + 1 if len(seen) else 0
+        rows = np.searchsorted(t, tracks[k].t)
+        measurements[join:] = np.nan
+        measurements[rows[rows >= join]] = tracks[k].measurements[rows >= join]
+    seen = np.flatnonzero(np.isfinite(measurements[:, 0]))
+    if not len(seen):
+        return None
+    lived = slice(seen[0], seen[-1] + 1)
+    positions, velocities = smooth(t[lived], measurements[lived], motion)
+    return Track(t[lived], positions, velocities, np.isnan(measurements[lived, 0]), measurements[lived])

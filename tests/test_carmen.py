@@ -1,0 +1,359 @@
+"""CARMEN logs, odometry and maps."""
+
+import gzip
+import os
+import struct
+import tempfile
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from dollop import carmen
+from dollop.files import FormatError
+from dollop.laser import LaserLog
+
+external = pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA is not set")
+
+
+def flaser(ranges, pose=(1, 2, 0.5), t=0.0):
+    """One FLASER line; the odometry pose is another than the laser's."""
+    numbers = " ".join(str(value) for value in (*ranges, *pose, 9, 9, 9))
+    return f"FLASER {len(ranges)} {numbers} {t} host {t}"
+
+
+def flasers(count, ranges=(1.0, 2.0, 3.0)):
+    """`count` good FLASER lines, a tenth of a second apart."""
+    return [flaser(ranges, t=i / 10) for i in range(count)]
+
+
+def write(path, lines):
+    """Write lines and return the path."""
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def random_log(seed=0, scans=30, beams=19, max_range=8.191):
+    """A log of noise, a tenth of it without return."""
+    rng = np.random.default_rng(seed)
+    ranges = rng.uniform(0.1, 8.1, (scans, beams))
+    ranges[rng.random(ranges.shape) < 0.1] = np.inf
+    poses = rng.normal(size=(scans, 3))
+    return LaserLog(100 + np.arange(scans) / 10, ranges, np.linspace(-1.5, 1.5, beams), poses, max_range)
+
+
+def assert_equal_to_precision(read, log):
+    """The same log, to 1 mm in range and six decimals in pose and time."""
+    np.testing.assert_array_equal(np.isinf(read.ranges), np.isinf(log.ranges))
+    finite = np.isfinite(log.ranges)
+    assert np.abs(read.ranges[finite] - log.ranges[finite]).max(initial=0) <= 0.001 + 1e-9
+    np.testing.assert_allclose(read.t, log.t, atol=1e-6)
+    np.testing.assert_allclose(read.poses, log.poses, atol=1e-6)
+    np.testing.assert_allclose(read.angles, log.angles, atol=1e-12)
+    assert read.max_range == log.max_range
+
+
+def test_flaser_is_read_as_carmen_means_it(tmp_path):
+    """Ranges, the laser's pose (not the odometry's), time, and beams from -90 degrees; comments are passed over."""
+    ranges = [1.5] * 180
+    lines = ["# FLASER is a comment here", "PARAM x 1 nohost 0", flaser(ranges, (1, 2, 0.5), 7.25), "NEFF 3", ""]
+    log = carmen.read_log(write(tmp_path / "a.log", lines))
+    assert log.ranges.shape == (1, 180) and (log.ranges == 1.5).all()
+    assert log.poses.tolist() == [[1, 2, 0.5]] and log.t.tolist() == [7.25]
+    np.testing.assert_allclose(np.rad2deg(log.angles), np.arange(-90, 90))
+
+
+def test_robotlaser_is_read_with_its_own_geometry(tmp_path):
+    """Start, resolution, maximum range and laser pose come from the message, remissions are passed over."""
+    line = "ROBOTLASER1 2 -0.5 1.0 0.25 5.6 0.01 0 5 1 2 5.6 3 0 2 7 8 1 2 3 4 5 6 0 0 0 0 0 12.5 host 0.1"
+    log = carmen.read_log(write(tmp_path / "a.log", [line]))
+    assert log.ranges.tolist() == [[1, 2, np.inf, 3, np.inf]]
+    assert log.angles.tolist() == [-0.5, -0.25, 0, 0.25, 0.5]
+    assert log.poses.tolist() == [[1, 2, 3]] and log.t.tolist() == [12.5] and log.max_range == 5.6
+
+
+@pytest.mark.parametrize(
+    ("count", "first", "last"),
+    [(180, -90, 89), (181, -90, 90), (360, -90, 89.5), (361, -90, 90), (401, -50, 50), (91, -90, 90), (1, -90, -90)],
+)
+def test_flaser_angles(count, first, last):
+    """The number of readings decides the spacing, as in CARMEN's reader."""
+    angles = np.rad2deg(carmen.flaser_angles(count))
+    assert len(angles) == count
+    np.testing.assert_allclose(angles[[0, -1]], [first, last], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("code", "max_range"),
+    [(8.191, 8.183), (8.183, 8.183), (32.767, 32.759), (51.15, 51.14), (81.83, 80.0), (81.91, 80)],
+)
+def test_error_codes_are_no_returns(tmp_path, code, max_range):
+    """A reading at the laser's full scale means that nothing came back; so does a reading of zero."""
+    log = carmen.read_log(write(tmp_path / "a.log", [flaser([1.0, code, 2.0, 0.0])]))
+    assert log.ranges.tolist() == [[1.0, np.inf, 2.0, np.inf]]
+    assert log.max_range == max_range
+
+
+def test_a_code_of_millimetres_is_a_distance_among_centimetres(tmp_path):
+    """8.19 m is a distance in a log whose readings go up to 81.91 m."""
+    log = carmen.read_log(write(tmp_path / "a.log", [flaser([8.19, 81.91])]))
+    assert log.ranges.tolist() == [[8.19, np.inf]]
+
+
+def test_unknown_full_scale_is_suspected(tmp_path):
+    """Many readings exactly at the largest one give a warning that says how to read them as no return."""
+    path = write(tmp_path / "a.log", [flaser([1.0, 2.0, 30.0, 4.0], t=i) for i in range(300)])
+    with pytest.warns(UserWarning, match="25% of the readings are exactly 30.0 m"):
+        carmen.read_log(path)
+    assert np.isinf(carmen.read_log(path, max_range=30.0).ranges[:, 2]).all()
+
+
+def test_robotlaser_is_preferred(tmp_path):
+    """Where a log holds the same scans twice, the message that states its geometry is taken."""
+    carmen.write_log(tmp_path / "a.log", random_log())
+    with open(tmp_path / "a.log", "a") as stream:
+        stream.write("\n".join(flasers(30)))
+    assert carmen.read_log(tmp_path / "a.log").ranges.shape == (30, 19)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    scans=st.integers(1, 4),
+    beams=st.integers(1, 12),
+    start=st.floats(-np.pi, 0),
+    fov=st.floats(0.1, 2 * np.pi),
+    max_range=st.floats(0.01, 100),
+    suffix=st.sampled_from([".log", ".log.gz"]),
+)
+def test_round_trip(seed, scans, beams, start, fov, max_range, suffix):
+    """What is written is read back to the format's precision, for any field of view, maximum range and share of inf."""
+    rng = np.random.default_rng(seed)
+    ranges = rng.uniform(0, max_range, (scans, beams))
+    ranges[rng.random(ranges.shape) < 0.3] = np.inf
+    t = np.cumsum(rng.uniform(0.01, 1, scans)) + rng.choice([0, 1.4e9])
+    angles = start + np.linspace(0, fov, beams)
+    log = LaserLog(t, ranges, angles, rng.normal(0, 100, (scans, 3)), max_range)
+    with tempfile.TemporaryDirectory() as folder:
+        carmen.write_log(Path(folder) / f"a{suffix}", log)
+        assert_equal_to_precision(carmen.read_log(Path(folder) / f"a{suffix}"), log)
+
+
+def test_the_same_log_gives_the_same_bytes(tmp_path):
+    """A packed log holds neither its name nor the time of writing."""
+    for name in ("a.log.gz", "b.log.gz"):
+        carmen.write_log(tmp_path / name, random_log())
+    assert (tmp_path / "a.log.gz").read_bytes() == (tmp_path / "b.log.gz").read_bytes()
+
+
+def test_uneven_beams_cannot_be_written(tmp_path):
+    """CARMEN knows one angular resolution, so other beams are refused and no file appears."""
+    log = LaserLog([0.0], [[1.0, 1.0, 1.0]], [0.0, 0.1, 0.3], [[0, 0, 0]], 8.0)
+    with pytest.raises(ValueError, match="evenly spaced"):
+        carmen.write_log(tmp_path / "a.log", log)
+    assert not list(tmp_path.iterdir())
+
+
+GOOD_LINE = flaser((1.0, 2.0, 3.0), t=99.0)
+BAD_LINES = {
+    "too few numbers": "FLASER 3 1.0 2.0",
+    "too few numbers: 1 fields": "FLASER",
+    r"12 fields in the line, expected 13 or 14": GOOD_LINE.replace("1.0 ", "", 1).replace("FLASER 3", "FLASER 3 ", 1),
+    "must be finite, got nan": GOOD_LINE.replace("2.0", "nan", 1),
+    "must be finite, got inf": GOOD_LINE.replace("2.0", "inf", 1),
+    "must not be negative, got -2.0": GOOD_LINE.replace("2.0", "-2.0", 1),
+    "could not convert string to float": GOOD_LINE.replace("2.0", "two", 1),
+    "must be at least 1, got -3": GOOD_LINE.replace("FLASER 3", "FLASER -3"),
+    "differs from most": flaser((1.0, 2.0, 3.0, 4.0), t=99.0),
+}
+
+
+@pytest.mark.parametrize("message", BAD_LINES)
+def test_one_bad_line_in_a_long_log(tmp_path, message):
+    """One broken line among many good ones is left out, with one warning that names it."""
+    lines = flasers(50)
+    lines.insert(10, BAD_LINES[message])
+    path = write(tmp_path / "a.log", lines)
+    reason = "" if "fields in the line" in message else message
+    with pytest.warns(UserWarning, match=f"left out 1 broken of 51 scans, the first on line 11: .*{reason}") as record:
+        log = carmen.read_log(path)
+    assert len(log) == 50 and len(record) == 1
+
+
+@pytest.mark.parametrize("message", BAD_LINES)
+def test_one_bad_line_in_a_short_log(tmp_path, message):
+    """The same line in a log of three scans is an error with file and line."""
+    lines = flasers(3)
+    lines.insert(1, BAD_LINES[message])
+    with pytest.raises(FormatError, match=r"a\.log, line 2: "):
+        carmen.read_log(write(tmp_path / "a.log", lines))
+
+
+def test_cut_off_log_loses_its_last_line(tmp_path):
+    """A log cut off in the middle of a line is read up to there, with a warning."""
+    text = "\n".join(flasers(50))
+    (tmp_path / "a.log").write_text(text[:-25])
+    with pytest.warns(UserWarning, match="left out 1 broken of 50 scans, the first on line 50"):
+        assert len(carmen.read_log(tmp_path / "a.log")) == 49
+
+
+def test_cut_off_time_is_not_taken_for_a_time(tmp_path):
+    """A line that ends in the middle of its time is broken, since nothing shows that the number is whole."""
+    lines = flasers(50)
+    lines[-1] = lines[-1][: lines[-1].index(" host")]
+    with pytest.warns(UserWarning, match="left out 1 broken of 50"):
+        assert carmen.read_log(write(tmp_path / "a.log", lines)).t[-1] == 4.8
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "empty"),
+        (b"# CARMEN Logfile\n", "no FLASER or ROBOTLASER1 message"),
+        (b"ODOM 0 0 0 0 0 0 1 host 1\n", "no FLASER or ROBOTLASER1 message"),
+        (b"\x7fELF\0\0\1\2" * 50, "binary"),
+        (bytes(range(128, 256)) * 50, "no FLASER"),
+        (b"FLASER 3 1 2\n", "too few numbers"),
+        (gzip.compress(b"FLASER 3 1 2 3 0 0 0 0 0 0 1 host 1\n" * 50)[:-20], "gzip data cut short"),
+    ],
+)
+def test_what_is_no_log(tmp_path, content, message):
+    """Empty, binary, truncated and other files give a FormatError that says what is wrong."""
+    (tmp_path / "a.log").write_bytes(content)
+    with pytest.raises(FormatError, match=message):
+        carmen.read_log(tmp_path / "a.log")
+
+
+def test_standing_clock_is_replaced_with_a_warning(tmp_path):
+    """A log whose clock is all zero keeps its scans, at the nominal rate, and says so."""
+    path = write(tmp_path / "a.log", [flaser((1.0, 2.0), t=0) for _ in range(30)])
+    with pytest.warns(UserWarning, match="stands still or runs backwards .29 of 30.*10 Hz"):
+        log = carmen.read_log(path)
+    np.testing.assert_allclose(log.t, np.arange(30) / 10)
+
+
+def test_a_step_back_in_time_is_left_out(tmp_path):
+    """One scan stamped before its predecessor goes, with a warning, and the poses keep to their scans."""
+    lines = flasers(50)
+    lines[20] = flaser((1.0, 2.0, 3.0), pose=(5, 5, 5), t=1.0)
+    with pytest.warns(UserWarning, match="left out 1 of 50 scans, which the clock puts out of order"):
+        log = carmen.read_log(write(tmp_path / "a.log", lines))
+    assert len(log) == 49 and 5 not in log.poses
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    kind=st.sampled_from(["flaser", "robotlaser", "odometry"]),
+    edits=st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 3), st.binary(max_size=6)), min_size=1, max_size=4),
+    zipped=st.booleans(),
+)
+def test_damaged_files_never_fail_in_the_depth(tmp_path, kind, edits, zipped):
+    """Whatever is overwritten, inserted, cut out or cut off: a log or a FormatError, and never another exception."""
+    path = tmp_path / "a.log"
+    if kind == "robotlaser":
+        carmen.write_log(path, random_log(scans=25, beams=3))
+    else:
+        write(path, [*flasers(25), *(f"ODOM {i} 0 0 0 0 0 {i} host {i}" for i in range(25))])
+    content = gzip.compress(path.read_bytes()) if zipped else path.read_bytes()
+    for place, action, piece in edits:
+        place %= len(content) + 1
+        end = {0: place + len(piece), 1: place, 2: place + 20, 3: len(content)}[action]
+        content = content[:place] + piece + content[end:]
+    path.write_bytes(content)
+    read = carmen.read_odometry if kind == "odometry" else carmen.read_log
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            assert len(read(path)) > 0
+        except FormatError as error:
+            assert "a.log" in str(error)
+
+
+def test_odometry(tmp_path):
+    """ODOM gives time, pose and velocity; a message out of order is left out with a warning."""
+    lines = [f"ODOM {i} {2 * i} 0.5 0.3 0.1 0 {i / 10} host 0" for i in range(30)]
+    lines.insert(5, "ODOM 7 7 7 0 0 0 0.0 host 0")
+    with pytest.warns(UserWarning, match="left out 1 of 31 ODOM messages"):
+        odometry = carmen.read_odometry(write(tmp_path / "a.log", lines))
+    i = np.arange(30)
+    np.testing.assert_allclose(odometry.t, i / 10)
+    np.testing.assert_allclose(odometry.poses, np.stack([i, 2 * i, 0 * i + 0.5], axis=1))
+    np.testing.assert_allclose(odometry.velocities, [[0.3, 0.1]] * 30)
+
+
+def test_odometry_without_a_clock_is_refused(tmp_path):
+    """Odometry whose clock stands still cannot be set against the scans, so it is an error."""
+    with pytest.raises(FormatError, match="clock is useless: 29 of 30"):
+        carmen.read_odometry(write(tmp_path / "a.log", ["ODOM 0 0 0 0 0 0 0 host 0"] * 30))
+    with pytest.raises(FormatError, match="no readable ODOM"):
+        carmen.read_odometry(write(tmp_path / "a.log", flasers(3)))
+
+
+def carmen_map(cells, chunks=b"", kind=1, name=b"", size=None):
+    """A map file as CARMEN writes it, of (width, height) cells of 0.1 m."""
+    width, height = cells.shape
+    chunk = b"GRIDMAP   " + name + struct.pack("<iif", width, height, 0.1) + cells.astype("<f4").tobytes()
+    head = b"# Map size : 2 x 3\n#\nCARMENMAPFILEv020"
+    return head + chunks + struct.pack("<Bi", kind, len(chunk) if size is None else size) + chunk
+
+
+CELLS = np.array([[0.0, 0.5, -1.0], [1.0, 0.25, 0.75]])
+
+
+def test_map_is_read_by_rows_of_y(tmp_path):
+    """Cell [x][y] of the file is row y, column x; -1 is unknown; other chunks and the chunk's name are passed over."""
+    other = struct.pack("<Bi", 32, 4) + b"abcd"
+    for content in (carmen_map(CELLS, other), gzip.compress(carmen_map(CELLS, kind=129, name=b"floor\0"))):
+        (tmp_path / "a.map").write_bytes(content)
+        occupancy, origin, resolution = carmen.read_map(tmp_path / "a.map")
+        np.testing.assert_array_equal(occupancy, [[0.0, 1.0], [0.5, 0.25], [np.nan, 0.75]])
+        assert resolution == 0.1 and origin == (-0.05, -0.05)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (carmen_map(CELLS)[:-3], "runs past the end"),
+        (carmen_map(CELLS, size=20), "cut short|do not fit"),
+        (carmen_map(CELLS, size=-20), "runs past the end"),
+        (carmen_map(CELLS, kind=2), "no gridmap chunk"),
+        (carmen_map(CELLS + 1), r"must be in \[0, 1\]"),
+        (carmen_map(CELLS * np.nan), r"must be in \[0, 1\]"),
+        (b"# a comment\nP5 3 3 255\n", "no CARMENMAPFILEv020"),
+        (b"FLASER 1\nCARMENMAPFILEv020", "no CARMENMAPFILEv020"),
+        (b"CARMENMAPFILEv020", "no gridmap chunk"),
+    ],
+)
+def test_what_is_no_map(tmp_path, content, message):
+    """Cut off, mislabelled and impossible maps give a FormatError that says what is wrong."""
+    (tmp_path / "a.map").write_bytes(content)
+    with pytest.raises(FormatError, match=message):
+        carmen.read_map(tmp_path / "a.map")
+
+
+@external
+@pytest.mark.parametrize(
+    ("name", "odometry"), [("intel", 10391), ("edmonton", 5858), ("csail", None), ("orebro", None)]
+)
+def test_real_odometry(name, odometry):
+    """Two of the recorded logs hold odometry with a usable clock, in the other two it is refused."""
+    path = Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / f"carmen_logs/{name}-corrected.log.gz"
+    if odometry is None:
+        with pytest.raises(FormatError, match="clock is useless"):
+            carmen.read_odometry(path)
+    else:
+        with pytest.warns(UserWarning, match="ODOM messages"):
+            assert len(carmen.read_odometry(path)) == odometry
+
+
+@external
+@pytest.mark.parametrize(("name", "shape"), [("wean5300", (326, 657)), ("thickwean", (170, 477))])
+def test_real_maps(name, shape):
+    """The maps of the paper's own era are read: decimetre cells, mostly unknown, a few per cent occupied."""
+    path = Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / f"carmen_maps/{name}.map"
+    occupancy, _, resolution = carmen.read_map(path)
+    assert occupancy.shape == shape and resolution == 0.1
+    assert 0.7 < np.isnan(occupancy).mean() < 0.9 and 0.02 < (occupancy >= 0.5).mean() < 0.1

@@ -1,0 +1,283 @@
+"""Occupancy grids: built from logs, measured, written and read."""
+
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from dollop.files import FormatError
+from dollop.gridmap import OccupancyGrid
+from dollop.laser import LaserLog
+from dollop.logs import read_log
+
+ROOM = np.array([[-2.02, 3.01], [-1.51, 2.53]])  # xmin, xmax; ymin, ymax
+
+
+def room_log(poses, max_range=8.0, beams=361):
+    """Exact scans of an empty rectangular room."""
+    poses = np.asarray(poses, dtype=float)
+    angles = np.linspace(-np.pi, np.pi, beams)[:-1]
+    bearings = poses[:, 2, None] + angles
+    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+    walls = np.where(directions > 0, ROOM[:, 1], ROOM[:, 0]) - poses[:, None, :2]
+    ranges = np.min(walls / np.where(directions == 0, 1e-9, directions), axis=-1, where=directions != 0, initial=np.inf)
+    return LaserLog(np.arange(len(poses)) / 10, np.where(ranges > max_range, np.inf, ranges), angles, poses, max_range)
+
+
+POSES = [(x, y, heading) for x in (-1.0, 0.52, 2.0) for y in (-0.5, 1.03) for heading in (0.1, 1.2)]
+
+
+def distance_to_walls(points):
+    """Distance of points from the outline of the room."""
+    inside = np.min(np.abs(np.asarray(points)[..., None] - ROOM), axis=(-2, -1))
+    beyond = np.maximum(np.maximum(ROOM[:, 0] - points, points - ROOM[:, 1]), 0)
+    return np.where(beyond.any(axis=-1), np.linalg.norm(beyond, axis=-1), inside)
+
+
+def test_room_is_recovered():
+    """The walls, all of them and nothing else, are occupied; the inside is free, the outside unknown."""
+    grid = OccupancyGrid.from_log(room_log(POSES), resolution=0.05)
+    rows_cols = np.argwhere(np.ones(grid.occupancy.shape))
+    distance, occupied = distance_to_walls(grid.cell_centres(rows_cols)), grid.occupied.ravel()
+    assert distance[occupied].max() <= 0.05 / np.sqrt(2) + 1e-9
+    along = np.linspace(0, 1, 200)[:, None]
+    (left, right), (low, high) = ROOM
+    corners = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
+    outline = np.concatenate([a + along * (b - a) for a, b in zip(corners, corners[1:], strict=False)])
+    assert grid.distance_at(outline * 0.9999).max() <= 0.1
+    centres = grid.cell_centres(rows_cols)
+    inside = ((centres > ROOM[:, 0] + 0.1) & (centres < ROOM[:, 1] - 0.1)).all(axis=1)
+    assert grid.free.ravel()[inside].mean() > 0.999
+    outside = ((centres < ROOM[:, 0] - 0.05) | (centres > ROOM[:, 1] + 0.05)).any(axis=1)
+    assert grid.unknown.ravel()[outside].all()
+
+
+def test_world_frame_does_not_matter():
+    """Shifting all poses by whole cells shifts the grid's origin and leaves the cells as they are."""
+    log = room_log(POSES)
+    moved = LaserLog(log.t, log.ranges, log.angles, log.poses + [64.0, -32.0, 0.0], log.max_range)
+    grid, other = OccupancyGrid.from_log(log, 0.0625), OccupancyGrid.from_log(moved, 0.0625)
+    np.testing.assert_allclose(np.subtract(other.origin, grid.origin), [64, -32])
+    assert (grid.occupied == other.occupied).mean() > 0.999
+
+
+def test_what_passes_is_swept_away():
+    """Something seen for a fifth of the time leaves no occupied cell, something seen for most of it does."""
+    for share, stays in ((0.2, False), (0.8, True)):
+        log = room_log([(0.0, 0.0, 0.0)] * 40)
+        ranges = log.ranges.copy()
+        ranges[: int(40 * share), 170:190] = 1.0
+        grid = OccupancyGrid.from_log(LaserLog(log.t, ranges, log.angles, log.poses, log.max_range))
+        row, col = grid.world_to_cell([1.0, 0.0])
+        assert grid.occupied[row - 1 : row + 2, col - 1 : col + 2].any() == stays
+
+
+def test_beams_without_return_clear_up_to_the_maximum_range():
+    """A beam that does not come back frees cells up to the maximum range, and hits none."""
+    log = LaserLog([0.0, 0.1], [[np.inf, 30.0]] * 2, [0.0, 1.0], [[0, 0, 0]] * 2, 50.0)
+    grid = OccupancyGrid.from_log(log, resolution=0.1, max_range=3.0)
+    assert grid.free.any() and not grid.occupied.any()
+    freed = grid.cell_centres(np.argwhere(grid.free))
+    assert 2.8 < np.linalg.norm(freed, axis=1).max() < 3.1
+
+
+def test_oversized_grid_is_refused():
+    """A pose astray far enough to ask for billions of cells is an error with the size, not a crash."""
+    with pytest.raises(ValueError, match="are more than 100000000"):
+        OccupancyGrid.from_log(room_log([(0, 0, 0), (1, 1, 0)]), resolution=1e-5)
+    with pytest.raises(ValueError, match="resolution must be positive and finite, got 0"):
+        OccupancyGrid.from_log(room_log([(0, 0, 0)]), resolution=0)
+
+
+GRIDS = hnp.arrays(
+    float,
+    hnp.array_shapes(min_dims=2, max_dims=2, max_side=7),
+    elements=st.one_of(st.just(np.nan), st.sampled_from([0.0, 0.5, 1.0]), st.floats(0, 1)),
+)
+ORIGINS = st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
+
+
+@settings(max_examples=60, deadline=None)
+@given(GRIDS, ORIGINS, st.sampled_from([0.05, 0.1, 0.025]), st.sampled_from([".map", ".yaml"]))
+def test_save_load_round_trip(occupancy, origin, resolution, suffix):
+    """Occupied, free and unknown cells come back as they were, probabilities to the format's precision."""
+    grid = OccupancyGrid(occupancy, origin, resolution)
+    with tempfile.TemporaryDirectory() as folder:
+        grid.save(Path(folder) / f"a{suffix}")
+        other = OccupancyGrid.load(Path(folder) / f"a{suffix}")
+    assert other.origin == grid.origin and other.resolution == resolution
+    np.testing.assert_array_equal(other.unknown, grid.unknown)
+    np.testing.assert_allclose(other.occupancy, occupancy, atol=1e-7 if suffix == ".map" else 0.01)
+    if suffix == ".yaml":
+        np.testing.assert_array_equal(other.occupied, grid.occupied)
+
+
+@settings(deadline=None)
+@given(GRIDS)
+def test_distance_field_is_brute_force(occupancy):
+    """The distance field is the smallest distance between cell centres, and inf where nothing is occupied."""
+    grid = OccupancyGrid(occupancy, (1.0, 2.0), 0.1)
+    centres = grid.cell_centres(np.argwhere(np.ones(occupancy.shape)))
+    obstacles = grid.cell_centres(np.argwhere(grid.occupied))
+    pairs = np.linalg.norm(centres[:, None] - obstacles, axis=-1)
+    expected = pairs.min(axis=1, initial=np.inf)
+    np.testing.assert_allclose(grid.distance_field().ravel(), expected, atol=1e-9)
+    np.testing.assert_allclose(grid.distance_at(centres), expected, atol=1e-9)
+
+
+def test_cells_and_points():
+    """A cell's centre lies in that cell; rows go with y, columns with x; off the map the distance is NaN."""
+    grid = OccupancyGrid(np.zeros((3, 5)), (10.0, -20.0), 0.5)
+    cells = np.argwhere(np.ones((3, 5)))
+    np.testing.assert_array_equal(grid.world_to_cell(grid.cell_centres(cells)), cells)
+    assert grid.world_to_cell([12.4, -20.0]).tolist() == [0, 4]
+    points = [[10.0, -20.0], [12.49, -18.51], [12.5, -19.0], [9.99, -19.0], [np.nan, -19.0]]
+    assert grid.covers(points).tolist() == [True, True, False, False, False]
+    assert np.isnan(grid.distance_at(points)).tolist() == [False, False, True, True, True]
+    assert grid.extent == (10.0, 12.5, -20.0, -18.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"occupancy": np.zeros(3)}, r"must be a grid of \(H, W\) cells, got shape \(3,\)"),
+        ({"occupancy": np.zeros((0, 3))}, r"got shape \(0, 3\)"),
+        ({"occupancy": [[0.0, 1.5]]}, r"must be in \[0, 1\].*got 1.5"),
+        ({"occupancy": [[0.0, -1.0]]}, r"must be in \[0, 1\].*got -1.0"),
+        ({"resolution": 0.0}, "resolution must be positive and finite, got 0.0"),
+        ({"resolution": np.nan}, "resolution must be positive and finite, got nan"),
+        ({"origin": (0.0, np.inf)}, "origin must be a finite x, y"),
+        ({"origin": (0.0, 0.0, 0.0)}, "origin must be a finite x, y"),
+    ],
+)
+def test_bad_values_are_named(change, message):
+    """What is no grid of probabilities is refused with the value and the rule."""
+    with pytest.raises(ValueError, match=message):
+        OccupancyGrid(**({"occupancy": [[0.0, 1.0]], "origin": (0.0, 0.0), "resolution": 0.05} | change))
+
+
+MAP_SERVER = """# written by map_server
+image: "floor.pgm"
+resolution: 0.050000
+origin: [-10.0, 5.5, 0.000000]  # x, y, yaw
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.196
+"""
+PGM = b"P5\n# CREATOR: map_saver\n3 2\n255\n" + bytes([0, 205, 254, 254, 100, 80])
+
+
+def load_ros(folder, text=MAP_SERVER, picture=PGM):
+    """Load a ROS map of these contents."""
+    (folder / "floor.pgm").write_bytes(picture)
+    (folder / "floor.yaml").write_text(text)
+    return OccupancyGrid.load(folder / "floor.yaml")
+
+
+def test_map_server_map(tmp_path):
+    """A map as map_server saves it: first row of the picture on top, dark is occupied, grey between is unknown."""
+    grid = load_ros(tmp_path)
+    assert grid.origin == (-10.0, 5.5) and grid.resolution == 0.05
+    assert grid.occupied.tolist() == [[False, False, True], [True, False, False]]
+    assert grid.unknown.tolist() == [[False, True, False], [False, True, False]]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "occupied"),
+    [
+        ("negate: 0", "negate: 1", [[True, False, False], [False, True, True]]),
+        ("0.65", "0.5", [[False, True, True], [True, False, False]]),
+        ("free_thresh", "mode: scale\nfree_thresh", [[False, True, True], [True, False, False]]),
+        ("free_thresh", "mode: raw\nfree_thresh", [[False, True, True], [False, False, False]]),
+    ],
+)
+def test_map_server_options(tmp_path, old, new, occupied):
+    """Negation, thresholds and modes mean what map_server says."""
+    assert load_ros(tmp_path, MAP_SERVER.replace(old, new)).occupied.tolist() == occupied
+
+
+def test_plain_pgm(tmp_path):
+    """A picture in plain text and with fewer steps of grey is read the same."""
+    grid = load_ros(tmp_path, picture=b"P2 3 2 # three by two\n5\n0 4 5\n5 2 1\n")
+    assert grid.occupied.tolist() == [[False, False, True], [True, False, False]]
+
+
+@pytest.mark.parametrize(
+    ("text", "picture", "message"),
+    [
+        ("image: floor.pgm\nresolution: 0.05\n", PGM, "the key 'origin' is missing"),
+        (MAP_SERVER.replace("0.050000", "fine"), PGM, "resolution must be a number, got 'fine'"),
+        (MAP_SERVER.replace("0.050000", "-1"), PGM, "resolution must be positive and finite, got -1"),
+        (MAP_SERVER.replace("0.000000", "0.3"), PGM, r"a turned map is not supported"),
+        (MAP_SERVER.replace("5.5, ", ""), PGM, r"origin must be \[x, y, 0\]"),
+        (MAP_SERVER.replace("5.5", "nan"), PGM, "origin must be"),
+        (MAP_SERVER + "mode: best\n", PGM, "mode must be trinary, scale or raw, got 'best'"),
+        (MAP_SERVER + "nonsense\n", PGM, "line 8: expected 'key: value', got 'nonsense'"),
+        (MAP_SERVER, PGM[:-1], "5 pixels"),
+        (MAP_SERVER, b"P6 3 2 255\n" + bytes(18), "not a PGM picture"),
+        (MAP_SERVER, b"P5 0 2 255\n", "a PGM of 0 x 2"),
+        (MAP_SERVER, b"P2 1 1 5\nx", "no number"),
+        (MAP_SERVER, b"P2 1 1 5\n7", "from 7 to 7, expected 0 to 5"),
+        (MAP_SERVER, b"P2 1 1 5\n-7", "from -7"),
+        (MAP_SERVER, b"P2 1 1 5\n", "0 pixels"),
+        (MAP_SERVER, b"", "empty"),
+    ],
+)
+def test_broken_ros_maps(tmp_path, text, picture, message):
+    """A map_server map that is not in order gives a FormatError with the file and the reason."""
+    with pytest.raises(FormatError, match=message):
+        load_ros(tmp_path, text, picture)
+
+
+def test_maps_by_suffix(tmp_path):
+    """Other names are refused, on reading and on writing, and a picture that is missing is named."""
+    grid = OccupancyGrid([[0.0, 1.0]], (0.0, 0.0), 0.05)
+    with pytest.raises(FormatError, match="a map is named .yaml"):
+        grid.save(tmp_path / "a.png")
+    with pytest.raises(FormatError, match="a map is named .yaml"):
+        OccupancyGrid.load(tmp_path / "a.png")
+    grid.save(tmp_path / "a.yaml")
+    (tmp_path / "a.pgm").unlink()
+    with pytest.raises(FormatError, match=r"a\.yaml: its picture 'a\.pgm' is missing"):
+        OccupancyGrid.load(tmp_path / "a.yaml")
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    name=st.sampled_from(["a.map", "a.yaml", "a.pgm"]),
+    edits=st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 2), st.binary(max_size=6)), min_size=1, max_size=4),
+)
+def test_damaged_maps_never_fail_in_the_depth(name, edits):
+    """Whatever is overwritten, inserted or cut off in a map's files: a grid or a FormatError, and nothing else."""
+    with tempfile.TemporaryDirectory() as folder:
+        main = Path(folder) / name.replace(".pgm", ".yaml")
+        OccupancyGrid([[0.0, 1.0, np.nan], [0.3, 0.7, 0.1]], (1.5, -2.0), 0.05).save(main)
+        content = (Path(folder) / name).read_bytes()
+        for place, action, piece in edits:
+            place %= len(content) + 1
+            content = content[:place] + piece + content[{0: place + len(piece), 1: place, 2: len(content)}[action] :]
+        (Path(folder) / name).write_bytes(content)
+        try:
+            assert OccupancyGrid.load(main).occupancy.size > 0
+        except FormatError as error:
+            assert folder in str(error)
+
+
+@pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA is not set")
+@pytest.mark.filterwarnings("ignore:.*clock")
+def test_real_building():
+    """The grid of the Intel lab explains its own scans: nearly all readings lie within 10 cm of an occupied cell."""
+    log = read_log(Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / "carmen_logs/intel-corrected.log.gz")
+    grid = OccupancyGrid.from_log(log)
+    scan, beam = np.nonzero(log.ranges < 20)
+    bearing = log.poses[scan, 2] + log.angles[beam]
+    reach = log.ranges[scan, beam, None]
+    points = log.poses[scan, :2] + reach * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+    assert grid.covers(points).all()
+    assert (grid.distance_at(points) <= 0.1).mean() > 0.9
+    assert 5_000 < grid.occupied.sum() < 20_000

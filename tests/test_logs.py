@@ -1,0 +1,78 @@
+"""Reading and writing by file name."""
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dollop.files import FormatError
+from dollop.laser import LaserLog
+from dollop.logs import read_log, write_log
+
+LOG = LaserLog([0.0, 0.1], [[1.0, np.inf], [2.0, 3.0]], [-0.5, 0.5], [[0, 0, 0], [1, 0, 0]], 8.191)
+
+
+@pytest.mark.parametrize("name", ["a.log", "a.log.gz", "a.clf", "with space.v2.clf.gz"])
+def test_carmen_by_suffix(tmp_path, name):
+    """A log written under any CARMEN suffix is read back, and packed exactly if it ends in .gz."""
+    write_log(tmp_path / name, LOG)
+    np.testing.assert_array_equal(read_log(str(tmp_path / name)).ranges, LOG.ranges)
+    assert (tmp_path / name).read_bytes().startswith(b"\x1f\x8b") == name.endswith(".gz")
+
+
+def test_other_suffixes_are_refused(tmp_path):
+    """A name that says no known format is an error that lists the known ones; nothing is written."""
+    with pytest.raises(FormatError, match=r"a\.bin: a CARMEN log is named \.log.*\.bag"):
+        write_log(tmp_path / "a.bin", LOG)
+    with pytest.raises(FormatError, match="a ROS bag"):
+        write_log(tmp_path / "a.bag", LOG)
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "a.txt").write_text("x")
+    with pytest.raises(FormatError, match="a CARMEN log is named"):
+        read_log(tmp_path / "a.txt")
+
+
+def test_missing_file(tmp_path):
+    """A file that is not there is named."""
+    for name in ("a.log", "a.bag", "a"):
+        with pytest.raises(FileNotFoundError, match=name):
+            read_log(tmp_path / name)
+
+
+def test_carmen_logs_have_no_topics(tmp_path):
+    """Asking a CARMEN log for a topic is an error and not silently passed over."""
+    write_log(tmp_path / "a.log", LOG)
+    with pytest.raises(ValueError, match="no topics, got topic='/scan'"):
+        read_log(tmp_path / "a.log", topic="/scan")
+
+
+def test_bags_without_rosbags_say_what_to_install(tmp_path, monkeypatch):
+    """Without the extra, a bag gives the command that installs it."""
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(ImportError, match=r'pip install "dollop\[ros\]"'):
+        read_log(tmp_path / "a.bag")
+
+
+@pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA is not set")
+@pytest.mark.parametrize(
+    ("name", "shape", "max_range", "warning"),
+    [
+        ("carmen_logs/intel-corrected.log.gz", (906, 180), 80.0, "left out 4 of 910"),
+        ("carmen_logs/edmonton-corrected.log.gz", (340, 180), 51.14, None),
+        ("carmen_logs/csail-corrected.log.gz", (406, 361), 80.0, "404 of 406 scans are out of order"),
+        ("carmen_logs/orebro-corrected.log.gz", (237, 181), 32.759, "236 of 237 scans are out of order"),
+        ("people/demo_stationary_simple_environment.bag", (1265, 512), 5.6, None),
+        ("people/walker_1.bag", (400, 768), 11.0, None),
+    ],
+)
+def test_real_logs(name, shape, max_range, warning, recwarn):
+    """Every real recording is read whole, its no-returns found, and a bad clock is warned of."""
+    log = read_log(Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / name)
+    assert log.ranges.shape == shape
+    assert log.max_range == pytest.approx(max_range, rel=1e-6)
+    assert 0.01 < np.isinf(log.ranges).mean() < 0.7
+    messages = [str(w.message) for w in recwarn]
+    assert len(messages) == (warning is not None) and all(warning in message for message in messages)

@@ -1,0 +1,213 @@
+"""Sec. II: tracking foreground objects and choosing the user."""
+
+import itertools
+
+import numpy as np
+import pytest
+from filterpy.common import Q_continuous_white_noise
+from filterpy.kalman import KalmanFilter, rts_smoother
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dollop.tracking import (
+    Motion,
+    Tracker,
+    identify_user,
+    match_greedily,
+    match_jointly,
+    predict,
+    smooth,
+    track_objects,
+    update,
+    user_track,
+)
+
+T = np.arange(0, 10, 0.1)
+
+
+def straight(start, velocity):
+    return np.asarray(start) + T[:, None] * np.asarray(velocity)
+
+
+def seen(*paths, hide=(), noise=0.0, seed=0):
+    """Objects per scan of the given paths (T, 2); `hide` holds (path, first scan, last scan)."""
+    rng = np.random.default_rng(seed)
+    hidden = {(p, i) for p, first, last in hide for i in range(first, last)}
+    return [
+        np.array([path[i] for p, path in enumerate(paths) if (p, i) not in hidden]).reshape(-1, 2)
+        + noise * rng.standard_normal((sum((p, i) not in hidden for p in range(len(paths))), 2))
+        for i in range(len(T))
+    ]
+
+
+def oracle(motion, z, dt):
+    """The same filter by filterpy, one axis."""
+    n = motion.order
+    F, _ = motion.transition(dt)
+    kalman = KalmanFilter(n, 1)
+    kalman.F, kalman.H = F, np.eye(1, n)
+    kalman.Q = Q_continuous_white_noise(n, dt, spectral_density=motion.noise)
+    kalman.R = np.array([[motion.measurement_sd**2]])
+    kalman.x = np.array([[z[0]]] + [[0.0]] * (n - 1))
+    kalman.P = np.diag([motion.measurement_sd**2, 1.0, 1.0][:n])
+    return kalman
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_kalman_filter_agrees_with_filterpy(order):
+    """Prediction, update and process noise are those of an independent implementation."""
+    motion, rng = Motion(order=order), np.random.default_rng(1)
+    z = rng.standard_normal((30, 2)).cumsum(axis=0)
+    reference = oracle(motion, z[:, 0], 0.1)
+    means, covariances = motion.birth(z[:1])
+    for measured in z[1:]:
+        means, covariances = predict(means, covariances, *motion.transition(0.1))
+        means, covariances = update(means, covariances, measured[None], motion.measurement_sd)
+        reference.predict()
+        reference.update(measured[0])
+    np.testing.assert_allclose(means[0, :, 0], reference.x[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(covariances[0], reference.P, rtol=1e-6, atol=1e-12)
+
+
+def test_smoother_agrees_with_filterpy():
+    """The Rauch-Tung-Striebel pass is that of an independent implementation."""
+    motion, rng = Motion(), np.random.default_rng(2)
+    z = rng.standard_normal((40, 2)).cumsum(axis=0)
+    reference = oracle(motion, z[:, 0], 0.1)
+    means, covariances = [reference.x.copy()], [reference.P.copy()]
+    for measured in z[1:]:
+        reference.predict()
+        reference.update(measured[0])
+        means.append(reference.x.copy())
+        covariances.append(reference.P.copy())
+    n = len(z)
+    smoothed = rts_smoother(np.array(means), np.array(covariances), [reference.F] * n, [reference.Q] * n)[0]
+    positions, velocities = smooth(0.1 * np.arange(n), z, motion)
+    np.testing.assert_allclose(positions[:, 0], smoothed[:, 0, 0], atol=1e-8)
+    np.testing.assert_allclose(velocities[:, 0], smoothed[:, 1, 0], atol=1e-8)
+
+
+costs = st.integers(0, 5).flatmap(
+    lambda k: st.integers(0, 5).flatmap(
+        lambda m: st.lists(st.lists(st.floats(0, 10), min_size=m, max_size=m), min_size=k, max_size=k).map(
+            lambda rows: np.array(rows).reshape(k, m)
+        )
+    )
+)
+
+
+@settings(deadline=None)
+@given(costs)
+def test_joint_matching_is_the_cheapest_of_all(cost):
+    """The Hungarian matching equals the best over all permutations, unmatched tracks at the price of the gate."""
+    tracks, objects = match_jointly(cost, 4.0)
+    k, m = cost.shape
+    padded = np.full((k, m + k), 4.0)
+    padded[:, :m] = cost
+    best = min((padded[range(k), p].sum() for p in itertools.permutations(range(m + k), k)), default=0.0)
+    assert cost[tracks, objects].sum() + 4.0 * (k - len(tracks)) == pytest.approx(best)
+
+
+@settings(deadline=None)
+@given(costs)
+def test_greedy_matching_takes_the_nearest_pair_and_stays_one_to_one(cost):
+    """No track or object is used twice, the nearest pair is in, and none left over is within the gate."""
+    tracks, objects = match_greedily(cost, 4.0)
+    assert len(set(tracks)) == len(tracks) and len(set(objects)) == len(objects)
+    if cost.size and cost.min() <= 4.0:
+        assert cost[tracks[0], objects[0]] == cost.min()
+    left = np.delete(np.delete(cost, tracks, axis=0), objects, axis=1)
+    assert left.size == 0 or left.min() > 4.0
+
+
+def test_an_occluded_walker_keeps_its_track_and_moves_on_in_a_straight_line():
+    """Velocity carries a walker through one second without sight (Sec. II)."""
+    path = straight([0, 0], [1.0, 0.5])
+    (track,) = track_objects(T, seen(path, hide=[(0, 50, 60)], noise=0.02))
+    assert track.occluded[50:60].all() and track.occluded.sum() == 10
+    np.testing.assert_allclose(track.positions[50:60], path[50:60], atol=0.25)
+    steps = np.diff(track.positions[50:60], axis=0)
+    np.testing.assert_allclose(steps, steps[:1].repeat(9, axis=0), atol=1e-9)
+
+
+def test_the_gate_grows_with_the_occlusion():
+    """A walker that turned while out of sight is taken back, though it is farther off than the smallest gate."""
+    path = straight([0, 0], [1.0, 0.0])
+    path[50:] = path[50] + (T[50:, None] - T[50]) * [0.35, 0.8]
+    tracks = track_objects(T, seen(path, hide=[(0, 50, 65)], noise=0.02))
+    assert len(tracks) == 1
+    assert np.hypot(*(tracks[0].positions[64] - path[64])) > 0.5
+
+
+def test_an_object_out_of_sight_for_too_long_has_disappeared():
+    """After `disappear_after` seconds the same place bears a new track; the old one ends where it was last seen."""
+    still = straight([2, 2], [0, 0])
+    objects = seen(still, hide=[(0, 20, 60)])
+    assert len(track_objects(T, objects, Tracker(disappear_after=5.0))) == 1
+    tracks = track_objects(T, objects, Tracker(disappear_after=3.0))
+    assert [track.t[-1] for track in tracks] == pytest.approx([T[19], T[-1]])
+
+
+@pytest.mark.parametrize("matching", ["greedy", "joint"])
+@pytest.mark.parametrize("occlusion", ["kalman", "particles"])
+def test_crossing_objects_keep_their_identity(matching, occlusion):
+    """A walker that passes in front of a can does not take the can's track along."""
+    walker, can = straight([0, 0], [1, 0]), straight([5, 0.5], [0, 0])
+    tracks = track_objects(
+        T, seen(walker, can, hide=[(0, 70, 75)], noise=0.02), Tracker(matching=matching, occlusion=occlusion)
+    )
+    assert len(tracks) == 2
+    for track, truth in zip(tracks, (walker, can), strict=True):
+        assert np.abs(track.positions - truth).max() < 0.35
+
+
+def test_particles_do_not_wait_where_the_laser_sees_nobody():
+    """A particle where a beam went on is not the occluded object: the prediction stays in the shadow."""
+    path = straight([0, 0], [1.0, 0.0])
+    objects = seen(path, hide=[(0, 50, 70)], noise=0.02)
+    shadow = lambda i, points: points[:, 0] > 5.5  # noqa: E731 beyond x = 5.5 m all is in sight
+    (track, *_) = track_objects(T, objects, Tracker(occlusion="particles"), shadow)
+    assert track.positions[60:70, 0].max() < 5.6
+
+
+def test_the_user_is_the_fastest_and_survives_a_loss():
+    """The user's trajectory is joined over two tracks, and no static object is chosen (Sec. II)."""
+    walker, can = straight([0, 0], [1, 0]), straight([5, 2], [0, 0])
+    walker[50:, 1] += 4.0
+    tracks = track_objects(T, seen(walker, can, hide=[(0, 45, 50)], noise=0.03))
+    assert len(tracks) == 3
+    user = user_track(T, tracks, identify_user(T, tracks))
+    np.testing.assert_allclose(user.positions[[5, 40, 60, 95]], walker[[5, 40, 60, 95]], atol=0.1)
+    assert user.occluded.sum() == 5
+
+
+def test_nobody_moves_nobody_is_the_user():
+    """Noise on static objects does not make a user of one."""
+    cans = straight([1, 1], [0, 0]), straight([3, 3], [0, 0])
+    tracks = track_objects(T, seen(*cans, noise=0.03))
+    users = identify_user(T, tracks)
+    assert (users == -1).all() and user_track(T, tracks, users) is None
+
+
+def test_no_objects_no_tracks():
+    """An empty room has no tracks and no user."""
+    assert track_objects(T, [np.zeros((0, 2))] * len(T)) == ()
+    assert (identify_user(T, ()) == -1).all()
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [dict(matching="best"), dict(occlusion="hope"), dict(gate=0), dict(gate_min=-1), dict(disappear_after=np.nan)],
+)
+def test_choices_out_of_range_are_named(choice):
+    """An error names the parameter, its value and the rule."""
+    with pytest.raises(ValueError, match=next(iter(choice))):
+        Tracker(**choice)
+
+
+def test_motion_out_of_range_is_named():
+    """An error names the parameter, its value and the rule."""
+    with pytest.raises(ValueError, match="order must be 2"):
+        Motion(order=1)
+    with pytest.raises(ValueError, match="noise must be positive, got -1"):
+        Motion(noise=-1)
