@@ -7,13 +7,13 @@ import os
 
 os.environ.update({name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")})
 
-import statistics  # noqa: E402
-import time  # noqa: E402
+import statistics
+import time
 
-import numpy as np  # noqa: E402
+import numpy as np
 
-from dollop.lds import DECAY, HORIZON, STEPS, LDS, SequencedLDS, Statistics, fewest_segments  # noqa: E402
-from dollop.trajectory import align, distance_to_polyline, retime  # noqa: E402
+from dollop.lds import DECAY, HORIZON, LDS, STEPS, SequencedLDS, Statistics, fewest_segments
+from dollop.trajectory import align, distance_to_polyline, retime
 
 SAMPLES, CANDIDATES = 200, 100
 BOUNDS = {1: 0.1, 5: 0.5}  # s

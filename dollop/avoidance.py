@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import dijkstra
 
 ROBOT_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
-KEPT, INFLUENCE = 0.15, 0.50
+KEPT, INFLUENCE = 0.20, 0.50
 """Distance in m between the robot's edge and an obstacle that the modulation keeps, and at which it sets in."""
 FREE_BELOW = 0.2
 """Occupancy below which a cell is trusted to be free: a stool's thin column is missed by most beams in its cell."""
@@ -190,7 +190,7 @@ class ObstacleMap:
 
 
 class Geodesic:
-    """Shortest ways on an ObstacleMap to one place; where the place is too near to something, to the nearest that is not.
+    """Shortest ways on an ObstacleMap to one place, or to the nearest place to it where the robot has room.
 
     Parameters
     ----------

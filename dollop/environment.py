@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 # A corner's place in its box: 0 lower left, then counter-clockwise. The columns are those of a box (x, y).
 _CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
@@ -134,8 +135,9 @@ def spring_forces(corners):
     True
     """
     differences = _differences(corners)
+    springs = _springs(differences)
     # k_mn / ||omega_n - omega_m|| = k_mn^(3/2)
-    return np.matmul(_springs(differences)[:, None] ** 1.5, differences)[:, 0]
+    return np.matmul((springs * np.sqrt(springs))[:, None], differences)[:, 0]
 
 
 def integer_costs(corners_i, corners_j, alpha=1e3):
@@ -158,8 +160,8 @@ def integer_costs(corners_i, corners_j, alpha=1e3):
     ValueError
         Where two corners of one environment coincide.
     """
-    changes = spring_forces(corners_i)[:, None] - spring_forces(corners_j)
-    return np.ceil(alpha * np.hypot(changes[..., 0], changes[..., 1]) - _ROUNDING).astype(np.int64)
+    changes = cdist(spring_forces(corners_i), spring_forces(corners_j))
+    return np.ceil(alpha * changes - _ROUNDING).astype(np.int64)
 
 
 def _differences(corners):

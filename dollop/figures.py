@@ -6,8 +6,8 @@ numbers in metrics.json.
 
 import argparse
 import json
-import os
 import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -36,7 +36,7 @@ def figure_3():
     i = scan_beside_the_cans(log)
     plot.scan(ax, log, i)
     plot.robot(ax, log.poses[i], label="robot")
-    plot.plane(ax).legend(loc="upper right")
+    legend_below(plot.plane(ax))
     return figure, {"beams": len(log.angles), "returns": int(np.isfinite(log.ranges[i]).sum())}
 
 
@@ -50,7 +50,8 @@ def figure_4():
     recording, grid = experiments.figure_eights(), experiments.background_map()
     log, observation = recording.log, experiments.figure_eights_observed()
     i = scan_beside_the_cans(log)
-    figure, axes = plt.subplots(2, 4, figsize=(13, 5.6), sharex=True, sharey=True)
+    figure, axes = plt.subplots(2, 4, figsize=(13, 6.2), sharex=True, sharey=True)
+    figure.get_layout_engine().set(w_pad=0.15, h_pad=0.15)
     stages = axes[0].tolist() + axes[1, ::-1].tolist()
     draw_sensing(stages[:3], log, grid, i)
     draw_objects(stages[3:5], log, grid, i)
@@ -59,8 +60,10 @@ def figure_4():
     for ax, title in zip(stages, STAGES, strict=True):
         plot.grid_map(ax, grid, colour="#D0D0D0")
         plot.plane(ax, title)
-        ax.set(xlim=(0, 9), ylim=(0, 7))
-        ax.label_outer()
+        ax.set(xlim=(-0.1, 9.1), ylim=(-0.1, 7.1), xlabel="", ylabel="", xticks=(0, 3, 6, 9), yticks=(0, 3, 6))
+    figure.supxlabel("x [m]", fontsize=9)
+    figure.supylabel("y [m]", fontsize=9)
+    figure.canvas.draw()  # so that the axes are where the arrows ask for them
     for before, after in FLOW:
         connect(figure, stages[before], stages[after])
     return figure, {}
@@ -83,11 +86,11 @@ def connect(figure, before, after):
     """An arrow from one stage to the next."""
     start, end = before.get_position().x0, after.get_position().x0
     if start == end:
-        places = (0.5, -0.04), (0.5, 1.12)
+        places = (0.5, -0.02), (0.5, 1.13)
     else:
-        places = ((1.0, 0.5), (0.0, 0.5)) if start < end else ((0.0, 0.5), (1.0, 0.5))
+        places = ((1.02, 0.5), (-0.02, 0.5)) if start < end else ((-0.02, 0.5), (1.02, 0.5))
     arrow = ConnectionPatch(
-        *places, before.transAxes, after.transAxes, arrowstyle="-|>", mutation_scale=16, linewidth=1.5
+        *places, before.transAxes, after.transAxes, arrowstyle="-|>", mutation_scale=20, linewidth=2, color="black"
     )
     figure.add_artist(arrow)
 
@@ -241,9 +244,11 @@ def main(arguments=None):
     unknown = [panel for panel in options.ids if panel not in FIGURES]
     if unknown:
         parser.error(f"no figure {', '.join(unknown)}; known: {', '.join(FIGURES)}")
-    options.folder.mkdir(parents=True, exist_ok=True)
-    if not os.access(options.folder, os.W_OK):
-        parser.error(f"the folder {options.folder} cannot be written to")
+    try:
+        options.folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=options.folder).close()
+    except OSError as error:
+        parser.error(f"the folder {options.folder} cannot be written to: {error}")
     written = options.folder / "metrics.json"
     metrics = json.loads(written.read_text()) if written.exists() else {}
     panels = options.ids or list(FIGURES)

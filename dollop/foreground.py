@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
+from scipy.sparse.csgraph import connected_components
 
 EIGHT_CONNECTED = np.ones((3, 3), dtype=bool)
 
@@ -18,8 +19,6 @@ class Blobs:
 
     Attributes
     ----------
-    centroids : (K, 2) float array
-        Mean of each blob's cell centres in m.
     areas : (K,) float array
         Enveloped area in m^2.
     cells : (M, 2) int array
@@ -28,7 +27,6 @@ class Blobs:
         Which blob each cell belongs to, 0..K-1.
     """
 
-    centroids: np.ndarray
     areas: np.ndarray
     cells: np.ndarray
     labels: np.ndarray
@@ -230,36 +228,56 @@ class ForegroundGrid:
         Blobs
         """
         occupied = self._active[self.value[self._active] > threshold]
-        return find_blobs(np.column_stack(np.divmod(occupied, self.shape[1])), self.origin, self.resolution, min_area)
+        return find_blobs(np.column_stack(np.divmod(occupied, self.shape[1])), self.resolution, min_area)
 
-    def objects(self, threshold=0.5, min_area=0.01):
-        """Centroids (K, 2) in m of the foreground objects that the last scan met.
+    def objects(self, threshold=0.5, min_area=0.01, stride=0.0):
+        """Centroids of the foreground objects that the last scan met.
 
         Memory holds cells together that are one object; what it holds in the shadow is not where the object is now.
-        So the centroid is that of a blob's cells that were hit, and a blob with none is not sensed. Parameters as for
-        `blobs`.
+        So the centroid is that of a blob's cells that were hit, and a blob with none is not sensed.
+
+        Parameters
+        ----------
+        threshold, min_area : float
+            As for `blobs`.
+        stride : float
+            Blobs nearer to each other than this, in m, are one object: the legs of a walker, to a laser that sees
+            no more of them.
+
+        Returns
+        -------
+        (K, 2) float array
+            Metres.
         """
         blobs = self.blobs(threshold, min_area)
         hit = self.sensed[blobs.cells @ [self.shape[1], 1]]
-        return blob_centroids(blobs.cells[hit], blobs.labels[hit], self.origin, self.resolution)
+        cells, labels = blobs.cells[hit], blobs.labels[hit]
+        if stride > 0 and len(blobs) > 1:
+            centroids = blob_centroids(blobs.cells, blobs.labels, self.origin, self.resolution)
+            labels = near_together(centroids, stride)[labels]
+        return blob_centroids(cells, labels, self.origin, self.resolution)
+
+
+def near_together(points, distance):
+    """Group numbers (M,) of points (M, 2), where chains of points nearer than `distance` are one group."""
+    apart = np.linalg.norm(points[:, None] - points, axis=2)
+    return connected_components(apart < distance, directed=False)[1]
 
 
 def blob_centroids(cells, labels, origin, resolution):
     """Mean (K, 2) in m of the cells (M, 2) of each blob that has any; labels (M,) from 0."""
     size = np.bincount(labels)
-    rows, columns = (np.bincount(labels, cells[:, k])[size > 0] / size[size > 0] for k in (0, 1))
-    return origin + resolution * (np.column_stack([columns, rows]) + 0.5)
+    sums = np.stack([np.bincount(labels, cells[:, k]) for k in (1, 0)], axis=1)
+    return origin + resolution * (sums[size > 0] / size[size > 0, None] + 0.5)
 
 
-def find_blobs(cells, origin, resolution, min_area=0.01):
+def find_blobs(cells, resolution, min_area=0.01):
     """Group occupied cells into blobs and keep the large ones.
 
     Parameters
     ----------
     cells : (M, 2) int array
         Row and column of each occupied cell.
-    origin : (2,) float array
-        Lower left corner of the grid in m.
     resolution : float
         Metres per cell.
     min_area : float
@@ -270,18 +288,25 @@ def find_blobs(cells, origin, resolution, min_area=0.01):
     Blobs
     """
     if len(cells) == 0:
-        return Blobs(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 2), int), np.zeros(0, int))
-    corner = cells.min(axis=0)
-    local = cells - corner
-    window = np.zeros(local.max(axis=0) + 1, dtype=bool)
-    window[local[:, 0], local[:, 1]] = True
+        return Blobs(np.zeros(0), np.zeros((0, 2), int), np.zeros(0, int))
+    rows, columns = closed_up(cells[:, 0]), closed_up(cells[:, 1])
+    window = np.zeros((rows.max() + 1, columns.max() + 1), dtype=bool)
+    window[rows, columns] = True
     labelled, count = ndimage.label(window, EIGHT_CONNECTED)
-    labels = labelled[local[:, 0], local[:, 1]] - 1
-    size = np.bincount(labels, minlength=count)
-    large = size * resolution**2 >= min_area - 1e-12
+    labels = labelled[rows, columns] - 1
+    areas = resolution**2 * np.bincount(labels, minlength=count)
+    large = areas >= min_area - 1e-12
     kept = large[labels]
-    labels, cells = (np.cumsum(large) - 1)[labels[kept]], cells[kept]
-    return Blobs(blob_centroids(cells, labels, origin, resolution), size[large] * resolution**2, cells, labels)
+    return Blobs(areas[large], cells[kept], (np.cumsum(large) - 1)[labels[kept]])
+
+
+def closed_up(index):
+    """Move cells together along one axis until at most one line between them is empty: fewer cells, the same blobs."""
+    order = np.argsort(index)
+    steps = np.minimum(np.diff(index[order], prepend=index[order[0]]), 2)
+    closed = np.empty_like(index)
+    closed[order] = np.cumsum(steps)
+    return closed
 
 
 def bounding_boxes(blobs, origin, resolution):

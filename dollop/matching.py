@@ -310,20 +310,27 @@ def _cheapest_cycle(edges):
 
 
 def _cheapest_cycle_of_many(edges):
-    # Node potentials make all edges non-negative (Johnson). The cheapest swap of two bounds the cheapest cycle, and so
-    # most edges are too dear to be part of it.
-    potentials = np.zeros(len(edges))
-    for _ in range(len(edges)):
-        shorter = np.minimum(potentials, (potentials[:, None] + edges).min(axis=0))
-        if np.allclose(shorter, potentials, rtol=0, atol=1e-12):
-            break
-        potentials = shorter
-    reduced = np.maximum(edges + potentials[:, None] - potentials, 0)
-    swap = (reduced + reduced.T).min()
+    # The cheapest swap of two bounds the cheapest cycle, so that, once node potentials have made all edges non-negative
+    # (Johnson), most edges are too dear to be part of it.
+    swap = (edges + edges.T).min()
     if not 0 < swap < np.inf:
         return swap
+    potentials = _potentials(edges)
+    reduced = np.maximum(edges + potentials[:, None] - potentials, 0)
     starts, ends = np.nonzero(reduced < swap)
     # A stored zero is an edge without weight, as wanted.
     graph = csr_array((reduced[starts, ends], (starts, ends)), shape=edges.shape)
     back = dijkstra(graph, limit=swap)
     return min(swap, (reduced[starts, ends] + back[ends, starts]).min(initial=np.inf))
+
+
+def _potentials(edges):
+    """Length of the shortest path to each node from anywhere (Bellman and Ford)."""
+    incoming, paths = edges.T.copy(), np.empty_like(edges)
+    potentials = np.zeros(len(edges))
+    for _ in range(len(edges)):
+        shorter = np.minimum(potentials, np.add(incoming, potentials, out=paths).min(axis=1))
+        if np.abs(shorter - potentials).max() < 1e-12:
+            break
+        potentials = shorter
+    return potentials

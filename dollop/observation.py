@@ -16,6 +16,10 @@ from dollop.foreground import (
 from dollop.tracking import Track, Tracker, identify_user, track_objects, user_track
 
 
+STATIC_EVERY = 5
+"""The slow grid looks at every fifth scan: what is static is still there then."""
+
+
 @dataclass(frozen=True)
 class Observation:
     """What Dollop has seen.
@@ -43,8 +47,9 @@ def observe(
     background,
     background_radius=0.20,
     gain=0.6,
-    static_gain=0.02,
+    static_gain=0.1,
     min_area=0.01,
+    stride=0.0,
     tracker=None,
     seed=0,
 ):
@@ -59,10 +64,13 @@ def observe(
     background_radius : float
         A reading is foreground if no background object lies within this radius, in m (Sec. II: 20 centimetres).
     gain, static_gain : float
-        Autoregressive gain per scan of the foreground grid that is tracked, and of the slow one that remembers
-        static objects: a walker wants no tail, a trash can wants patience.
+        Autoregressive gain of the foreground grid that is tracked, per scan, and of the slow one that remembers
+        static objects, per fifth scan: a walker wants no tail, a trash can wants patience.
     min_area : float
         Smallest foreground object in m^2 (Sec. II: 100 square centimetres).
+    stride : float
+        Blobs nearer to each other than this, in m, are one object. Zero for a laser at waist height, as in the paper;
+        at leg height a walker is two blobs up to half a metre apart.
     tracker : Tracker, optional
         How objects are tracked; the paper's choices by default.
     seed : int or Generator
@@ -83,8 +91,9 @@ def observe(
     for i, hits in enumerate(foreground_hits(log, background, background_radius)):
         scan = hits, log.poses[i], log.angles, log.ranges[i]
         moving.update(*scan)
-        static.update(*scan)
-        objects.append(moving.objects(min_area=min_area))
+        if i % STATIC_EVERY == 0:
+            static.update(*scan)
+        objects.append(moving.objects(min_area=min_area, stride=stride))
 
     def visible(i, points):
         return seen_free(points, log.poses[i], log.angles, log.ranges[i])

@@ -93,3 +93,24 @@ def scan(ax, log, i, label="laser scan"):
         linewidth=0.3,
     )
     ax.plot(*ends[back].T, ".", color="black", markersize=3, label=label)
+
+
+def workspace(grid, pose=None, obstacles=(), ax=None, title=None):
+    """Axes for the plane with the background map, and where given the watching robot and the obstacles' boxes."""
+    ax = plane(ax, title)
+    grid_map(ax, grid)
+    boxes(ax, obstacles, "obstacles")
+    if pose is not None:
+        robot(ax, pose, label="robot")
+    return ax
+
+
+def cells(ax, values, grid, **kwargs):
+    """Values (H, W) of the cells of `grid` as an image; cells that are zero stay blank."""
+    image = np.ma.masked_equal(values.reshape(grid.occupancy.shape), 0)
+    return ax.imshow(image, origin="lower", extent=grid.extent, **({"cmap": "Blues"} | kwargs))
+
+
+def legend(ax):
+    """A legend in one row under the axes, where it hides nothing."""
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=5, columnspacing=1.0)

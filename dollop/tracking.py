@@ -123,8 +123,10 @@ def match_greedily(cost, gate):
     """
     tracks, objects = [], []
     open_cost = np.where(cost <= gate, cost, np.inf)
-    while open_cost.size and np.isfinite(best := open_cost.min()):
-        k, m = np.argwhere(open_cost == best)[0]
+    for _ in range(min(cost.shape)):
+        k, m = divmod(int(open_cost.argmin()), cost.shape[1])
+        if open_cost[k, m] == np.inf:
+            break
         tracks.append(k)
         objects.append(m)
         open_cost[k, :] = open_cost[:, m] = np.inf
@@ -162,8 +164,9 @@ class Tracker:
     gate : float
         Largest distance between prediction and object in standard deviations of their difference; it therefore grows
         while an object is occluded.
-    gate_min : float
-        The gate is never narrower than this, in m.
+    gate_min, gate_max : float
+        The gate is never narrower or wider than this, in m: a walker may turn while out of sight, but nobody comes
+        back at the other end of the room.
     disappear_after : float
         Occluded for longer than this, in s, is disappeared (Sec. II: 5 seconds).
     """
@@ -173,6 +176,7 @@ class Tracker:
     occlusion: str = "kalman"
     gate: float = 3.0
     gate_min: float = 0.5
+    gate_max: float = 1.5
     disappear_after: float = 5.0
 
     def __post_init__(self):
@@ -180,7 +184,7 @@ class Tracker:
             raise ValueError(f"matching must be one of {sorted(MATCHERS)}, got {self.matching!r}")
         if self.occlusion not in ("kalman", "particles"):
             raise ValueError(f"occlusion must be 'kalman' or 'particles', got {self.occlusion!r}")
-        for name in ("gate", "gate_min", "disappear_after"):
+        for name in ("gate", "gate_min", "gate_max", "disappear_after"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
 
@@ -249,7 +253,7 @@ class _Tracks:
         tracker, motion = self.tracker, self.tracker.motion
         offset = self.means[:, None, 0] - objects[None]
         sd = np.sqrt(self.covariances[:, 0, 0] + motion.measurement_sd**2)
-        scale = np.maximum(sd, tracker.gate_min / tracker.gate)
+        scale = np.clip(sd, tracker.gate_min / tracker.gate, tracker.gate_max / tracker.gate)
         cost = np.hypot(offset[..., 0], offset[..., 1]) / scale[:, None]
         matched, found = MATCHERS[tracker.matching](cost, tracker.gate)
         self.measured = np.full((len(self.means), 2), np.nan)
@@ -335,21 +339,26 @@ def smooth(t, measurements, motion=None):
     """
     motion = motion or Motion()
     means, covariances = motion.birth(measurements[:1])
-    predicted, filtered, transitions = [], [(means, covariances)], []
+    transitions = {dt: motion.transition(dt) for dt in np.unique(np.diff(t))}
+    predicted, filtered, F = [], [(means, covariances)], [transitions[dt][0] for dt in np.diff(t)]
     for dt, z in zip(np.diff(t), measurements[1:], strict=True):
-        F, Q = motion.transition(dt)
-        means, covariances = predict(means, covariances, F, Q)
+        means, covariances = predict(means, covariances, *transitions[dt])
         predicted.append((means, covariances))
-        transitions.append(F)
         if np.isfinite(z[0]):
             means, covariances = update(means, covariances, z[None], motion.measurement_sd)
         filtered.append((means, covariances))
-    smoothed = [means[0]]
-    for (ahead, ahead_cov), (mean, cov), F in zip(predicted[::-1], filtered[-2::-1], transitions[::-1], strict=True):
-        G = np.linalg.solve(ahead_cov[0], F @ cov[0]).T
-        smoothed.append(mean[0] + G @ (smoothed[-1] - ahead[0]))
-    states = np.array(smoothed[::-1])
-    return states[:, 0], states[:, 1]
+    return smooth_backwards(filtered, predicted, F)
+
+
+def smooth_backwards(filtered, predicted, F):
+    """The backward pass: x_n <- x_n + P_n F^T P_{n+1|n}^-1 (x_{n+1} - x_{n+1|n}), from the last state to the first."""
+    x, P = (np.concatenate(column) for column in zip(*filtered, strict=True))
+    if predicted:
+        ahead, ahead_P = (np.concatenate(column) for column in zip(*predicted, strict=True))
+        gains = P[:-1] @ np.transpose(F, (0, 2, 1)) @ np.linalg.inv(ahead_P)
+        for n in reversed(range(len(gains))):
+            x[n] += gains[n] @ (x[n + 1] - ahead[n])
+    return x[:, 0], x[:, 1]
 
 
 def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):

@@ -132,7 +132,7 @@ def test_the_robust_method_is_right_on_300_layouts_each():
 
 
 def test_the_robust_method_is_right_where_a_can_is_missing_or_added():
-    """Three cans, one missing or one added: right in 95 % of 300 layouts, and in 99 % of those it is confident about."""
+    """Three cans, one missing or one added: right in 95 % of 300 layouts, in 99 % of those it is confident about."""
     shares = matching_shares(objects=(3,), noises=(0.05,), changes=("missing", "added"))
     assert (shares["right"] >= 0.95).all()
     assert (shares["right_if_confident"] >= 0.99).all()

@@ -134,9 +134,11 @@ def test_the_gate_grows_with_the_occlusion():
     """A walker that turned while out of sight is taken back, though it is farther off than the smallest gate."""
     path = straight([0, 0], [1.0, 0.0])
     path[50:] = path[50] + (T[50:, None] - T[50]) * [0.35, 0.8]
-    tracks = track_objects(T, seen(path, hide=[(0, 50, 65)], noise=0.02))
+    objects = seen(path, hide=[(0, 50, 62)], noise=0.02)
+    tracks = track_objects(T, objects)
     assert len(tracks) == 1
-    assert np.hypot(*(tracks[0].positions[64] - path[64])) > 0.5
+    assert np.hypot(*(tracks[0].positions[61] - path[61])) > 0.8
+    assert len(track_objects(T, objects, Tracker(gate_max=0.8))) == 2
 
 
 def test_an_object_out_of_sight_for_too_long_has_disappeared():
@@ -164,10 +166,10 @@ def test_crossing_objects_keep_their_identity(matching, occlusion):
 def test_particles_do_not_wait_where_the_laser_sees_nobody():
     """A particle where a beam went on is not the occluded object: the prediction stays in the shadow."""
     path = straight([0, 0], [1.0, 0.0])
-    objects = seen(path, hide=[(0, 50, 70)], noise=0.02)
+    objects = seen(path, hide=[(0, 50, 64)], noise=0.02)
     shadow = lambda i, points: points[:, 0] > 5.5  # noqa: E731 beyond x = 5.5 m all is in sight
     (track, *_) = track_objects(T, objects, Tracker(occlusion="particles"), shadow)
-    assert track.positions[60:70, 0].max() < 5.6
+    assert track.positions[58:64, 0].max() < 5.6
 
 
 def test_the_user_is_the_fastest_and_survives_a_loss():

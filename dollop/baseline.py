@@ -1,0 +1,211 @@
+"""What merging (`dollop.cdhmm`) is measured against: hidden Markov models of a chosen size, and the plain mean.
+
+Demonstrations of known tasks are drawn with subgoals that scatter and, now and then, one subgoal that is no part of the
+task. Every method gets the same demonstrations and says what it takes for the task: subgoals in order, (L, 2).
+"""
+
+import logging
+from collections import Counter
+from functools import partial
+from itertools import groupby, product
+from time import process_time
+
+import numpy as np
+import pandas as pd
+from tqdm import tqdm
+
+from dollop.cdhmm import SubgoalHMM
+
+TASKS = {  # subgoals in m, six each
+    "slalom": ((0.0, 0.0), (1.5, 0.9), (3.0, -0.9), (4.5, 0.9), (6.0, -0.9), (7.5, 0.0)),
+    "figure-eight": ((-2.0, 0.0), (0.0, 0.0), (1.5, 1.2), (3.0, 0.0), (0.0, 0.0), (-1.5, 1.2)),
+    "ring": tuple((2 * np.cos(a), 2 * np.sin(a)) for a in np.arange(6) * np.pi / 3),
+}
+
+
+def draw_demonstrations(task, n, spread, extra=0.3, seed=0):
+    """Draw demonstrations of a task: each subgoal scattered, and in some of them one more that is no part of it.
+
+    The additional subgoal comes anywhere in the order, before the first and after the last included. Its position is
+    anywhere within the task's bounding box widened by half a metre.
+
+    Parameters
+    ----------
+    task : (K, 2) array_like
+        The true subgoals in m.
+    n : int
+        Number of demonstrations.
+    spread : float
+        Standard deviation of a subgoal along each axis in m.
+    extra : float
+        Probability that a demonstration has one more subgoal.
+    seed : int or numpy.random.Generator
+
+    Returns
+    -------
+    list of (K, 2) or (K + 1, 2) float arrays
+    """
+    task, random = np.asarray(task, float), np.random.default_rng(seed)
+    low, high = task.min(0) - 0.5, task.max(0) + 0.5
+    demonstrations = []
+    for _ in range(n):
+        subgoals = task + random.normal(0, spread, task.shape)
+        position, stray, has_one = random.integers(len(task) + 1), random.uniform(low, high), random.random() < extra
+        demonstrations.append(np.insert(subgoals, position, stray, axis=0) if has_one else subgoals)
+    return demonstrations
+
+
+# ---- what each method takes for the task
+
+
+def merged(sequences, spread=0.15):
+    """Subgoals on the most-likely path of a `SubgoalHMM`: (L, 2) in m."""
+    model = SubgoalHMM.fit(sequences, spread)
+    return model.means[model.most_likely_path()]
+
+
+def plain_mean(sequences):
+    """Mean of the demonstrations, subgoal by subgoal, after stretching each to their median length: (L, 2) in m."""
+    length = int(np.median([len(sequence) for sequence in sequences]))
+    return np.mean([_stretch(np.asarray(sequence, float), length) for sequence in sequences], axis=0)
+
+
+def _stretch(sequence, length):
+    at, given = np.linspace(0, 1, length), np.linspace(0, 1, len(sequence))
+    return np.stack([np.interp(at, given, column) for column in sequence.T], axis=-1)
+
+
+def gaussian_hmm(sequences, left_to_right=False, n_states=range(2, 11), restarts=5, seed=0, spread=0.15):
+    """Subgoals by hidden Markov models of hmmlearn, the number of states chosen by BIC.
+
+    Expectation-maximisation from several random starts for each number of states; the best of each is compared by BIC.
+    The task is the sequence of states that the most demonstrations follow (Viterbi, repetitions dropped), the shorter
+    where several do.
+
+    Parameters
+    ----------
+    sequences : sequence of (K, 2) array_like
+        Subgoals of each demonstration in m.
+    left_to_right : bool
+        Allow only steps to the same state or a later one, from the first state on.
+    n_states : iterable of int
+        Numbers of states to compare; never more than there are subgoals.
+    restarts : int
+        Random starts for each number of states.
+    seed : int
+    spread : float
+        What is expected of a state, standard deviation in m: the prior of the covariance, the same that merging is given.
+
+    Returns
+    -------
+    (L, 2) float array
+        In m.
+    """
+    points, lengths = np.concatenate(sequences), [len(sequence) for sequence in sequences]
+    random = np.random.RandomState(seed)
+    sizes = [size for size in n_states if size <= len(points)]
+    models = [_fitted(size, left_to_right, random, points, lengths, spread) for size in sizes for _ in range(restarts)]
+    scores = [np.inf if model is None else model.bic(points, lengths) for model in models]
+    model = models[int(np.nanargmin(scores))]
+    return model.means_[list(_common_path(model, sequences))]
+
+
+def _fitted(size, left_to_right, random, points, lengths, spread):
+    """One run of expectation-maximisation, or None where it broke down."""
+    from hmmlearn.hmm import GaussianHMM
+
+    logging.getLogger("hmmlearn").setLevel(logging.ERROR)  # it warns of every run that stops early
+    allowed = np.triu(np.ones((size, size))) if left_to_right else np.ones((size, size))
+    model = GaussianHMM(
+        size,
+        covariance_type="diag",
+        covars_prior=spread**2,
+        transmat_prior=1 + 1e-3 * allowed,
+        n_iter=100,
+        random_state=random,
+        params="mct" if left_to_right else "smct",
+        init_params="mc" if left_to_right else "smct",
+    )
+    if left_to_right:
+        model.startprob_ = np.eye(size)[0]
+        model.transmat_ = allowed / allowed.sum(1, keepdims=True)
+    try:
+        with np.errstate(all="ignore"):
+            return model.fit(points, lengths)
+    except ValueError:
+        return None
+
+
+def _common_path(model, sequences):
+    paths = Counter(tuple(state for state, _ in groupby(model.predict(sequence))) for sequence in sequences)
+    return min(paths, key=lambda path: (-paths[path], len(path), path))
+
+
+# ---- the comparison
+
+
+METHODS = {
+    "merging": merged,
+    "HMM, BIC": gaussian_hmm,
+    "left-to-right HMM, BIC": partial(gaussian_hmm, left_to_right=True),
+    "plain mean": plain_mean,
+}
+
+
+def judge(found, task):
+    """Compare subgoals found (L, 2) with the true ones (K, 2), in m.
+
+    Returns
+    -------
+    dict
+        `right_number`; `right_order`: as many, and each nearer to its own true subgoal than to any that lies elsewhere;
+        `error`: mean distance to the true subgoals in m, nan where the number is wrong.
+    """
+    found, task = np.asarray(found, float), np.asarray(task, float)
+    if len(found) != len(task):
+        return {"right_number": False, "right_order": False, "error": np.nan}
+    distances = np.linalg.norm(found[:, None] - task, axis=-1)
+    own = np.diagonal(distances)
+    return {"right_number": True, "right_order": bool((own <= distances.min(1)).all()), "error": own.mean()}
+
+
+def study(tasks=tuple(TASKS), numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=range(100), methods=tuple(METHODS)):
+    """Let every method find every task from the same demonstrations, one subgoal too many in 30 % of them.
+
+    Parameters
+    ----------
+    tasks, methods : sequence of str
+        Names in `TASKS` and `METHODS`.
+    numbers : sequence of int
+        Numbers of demonstrations.
+    spreads : sequence of float
+        Standard deviation of a subgoal along each axis in m. The methods are not told; they expect their default.
+    seeds : sequence of int
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per task, number `n`, `spread`, `seed` and `method`: what `judge` says, `length` of the path found, and
+        `seconds` of processor time it took.
+    """
+    cases = list(product(tasks, numbers, spreads, seeds))
+    rows = []
+    for name, n, spread, seed in tqdm(cases, desc="structure study"):
+        demonstrations = draw_demonstrations(TASKS[name], n, spread, seed=seed)
+        for method in methods:
+            begin = process_time()
+            found = METHODS[method](demonstrations)
+            case = {"task": name, "n": n, "spread": spread, "seed": seed, "method": method, "length": len(found)}
+            rows.append(case | judge(found, TASKS[name]) | {"seconds": process_time() - begin})
+    return pd.DataFrame(rows)
+
+
+def summary(table):
+    """Shares of right number and right order, mean error in m and median seconds, by task, spread, n and method."""
+    groups = table.groupby(["task", "spread", "n", "method"], sort=False)
+    return groups.agg(
+        right_number=("right_number", "mean"),
+        right_order=("right_order", "mean"),
+        error=("error", "mean"),
+        seconds=("seconds", "median"),
+    )

@@ -1,0 +1,321 @@
+"""The supervisory control law that a sequenced LDS induces (end of Sec. III).
+
+In segment k the law maps the current state to a direction, whatever brought the robot there:
+
+    u(p) = (A_k - I)(p - g_k) / |(A_k - I)(p - g_k)|.
+
+A segment stays in force until the robot is within 0.25 m of its subgoal g_k; then the next one takes over. So a robot
+that is kidnapped keeps its segment: it goes on to the subgoal it was heading for, as the user would have done from
+there, and skips none. Two control laws make v and omega of it:
+
+- `Plain` turns towards u and drives at the demonstrated speed; it knows nothing of what the robot can do.
+- `Pursuit` rolls the response out from the current state and pursues a point ahead on it, slower where it bends.
+
+The paper gives neither the rule of handing over nor a controller: both are reconstructions.
+"""
+
+from collections import namedtuple
+from math import atan2, cos, hypot, pi, sin
+
+import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
+
+from dollop.avoidance import Geodesic
+
+REACH = 0.25
+"""How near to its subgoal a segment hands over, in m: a robot that needs 0.6 m to turn would circle nearer ones."""
+PATIENCE = 8.0
+"""Time in s without progress after which the way is changed or the speed halved; turning round takes half of it."""
+STEP = 0.05
+"""Distance in m between the places of a response that is pursued."""
+LOOK_AHEAD = 7
+"""How many places ahead the pursued one is: 0.35 m."""
+STRAY = 0.3
+"""Distance in m from its response at which it is rolled out anew from where the robot is."""
+JUMP = 0.3
+"""Distance in m in one control period that no robot drives: it has been kidnapped."""
+FARTHEST = 100.0
+"""Length in m after which a response that has not come to its subgoal is given up."""
+LEAST_SPEED = 0.1
+"""Speed in m/s that a segment is driven at even where the user hardly moved."""
+SHARP = 1.2
+"""Angle in rad from which a robot turns first and drives then."""
+SLOWEST = 1 / 16
+"""Share of the demonstrated speed below which a robot that makes no progress gives up."""
+
+Limits = namedtuple("Limits", "speed turn acceleration turn_acceleration")
+PIONEER_LIMITS = Limits(0.5, 0.8, 0.5, 1.57)
+"""Speed in m/s, turning rate in rad/s (CARMEN, p2d8+), accelerations in m/s^2 and rad/s^2 (Stage, pioneer.inc)."""
+
+
+def clip(value, limit):
+    """The value cut to [-limit, limit]."""
+    return max(-limit, min(limit, value))
+
+
+def wrap(angle):
+    """The angle in rad, in (-pi, pi]."""
+    return pi - (pi - angle) % (2 * pi)
+
+
+class Guidance:
+    """The direction of a sequenced LDS at any state, round obstacles if it is given any.
+
+    Parameters
+    ----------
+    law : SequencedLDS
+    obstacles : ObstacleMap, optional
+
+    Attributes
+    ----------
+    detours : dict
+        For a segment whose response does not get through: the `Geodesic` to its subgoal that is followed instead, or,
+        without obstacles, None for the straight line.
+    """
+
+    def __init__(self, law, obstacles=None):
+        self.obstacles = obstacles
+        self.goals = [tuple(segment.goal.tolist()) for segment in law.segments]
+        self.steps = [(segment.A - np.eye(2)).ravel().tolist() for segment in law.segments]
+        self.weights = [solve_discrete_lyapunov(s.A.T, np.eye(2))[[0, 0, 1], [0, 1, 1]].tolist() for s in law.segments]
+        self.detours, self.geodesics = {}, {}
+
+    def direction(self, k, x, y):
+        """Unit vector in which segment k sends a robot at x, y in m."""
+        if k in self.detours:
+            return self.detour_direction(k, x, y)
+        ux, uy = self.response_direction(k, x, y)
+        return self.obstacles.modulate(x, y, ux, uy) if self.obstacles else (ux, uy)
+
+    def response_direction(self, k, x, y):
+        """Unit vector of (A_k - I)(p - g_k) at p = (x, y)."""
+        (gx, gy), (a, b, c, d) = self.goals[k], self.steps[k]
+        x, y = x - gx, y - gy
+        ux, uy = a * x + b * y, c * x + d * y
+        size = hypot(ux, uy) or 1.0
+        return ux / size, uy / size
+
+    def detour_direction(self, k, x, y):
+        """Unit vector along the shortest way to subgoal k."""
+        if self.detours[k]:
+            return self.detours[k].direction(x, y)
+        gx, gy = self.goals[k]
+        size = hypot(gx - x, gy - y) or 1.0
+        return (gx - x) / size, (gy - y) / size
+
+    def detour(self, k):
+        """Leave the response of segment k for the shortest way to its subgoal."""
+        if self.obstacles and k not in self.geodesics:
+            self.geodesics[k] = Geodesic(self.obstacles, self.goals[k])
+        self.detours[k] = self.geodesics.get(k)
+
+    def remaining(self, k, x, y):
+        """What falls on the way to subgoal k: the length of a detour, else the Lyapunov measure |x|_P of the offset.
+
+        P solves A^T P A - P = -I. Along u the measure falls, for x^T P x is convex and falls from x to A x.
+        """
+        if self.detours.get(k):
+            return self.detours[k].distance(x, y)
+        (gx, gy), (p, q, r) = self.goals[k], self.weights[k]
+        x, y = x - gx, y - gy
+        return (p * x * x + 2 * q * x * y + r * y * y) ** 0.5
+
+    def reached(self, k, x, y, reach):
+        """Whether x, y in m is within reach of subgoal k, or of the place nearest to it where the robot has room."""
+        gx, gy = self.goals[k]
+        if hypot(x - gx, y - gy) < reach:
+            return True
+        if not self.detours.get(k):
+            return False
+        gx, gy = self.detours[k].goal
+        return hypot(x - gx, y - gy) < reach
+
+    def leg(self, k, x, y):
+        """The response of segment k rolled out from x, y in m: a list of places 5 cm apart, and whether it arrived."""
+        places = []
+        for _ in range(round(FARTHEST / STEP)):
+            if self.reached(k, x, y, STEP):
+                return places, True
+            ux, uy = self.direction(k, x, y)
+            ux, uy = self.direction(k, x + STEP / 2 * ux, y + STEP / 2 * uy)  # the midpoint keeps spirals from widening
+            x, y = x + STEP * ux, y + STEP * uy
+            places.append((x, y))
+        return places, False
+
+    def way(self, k, x, y):
+        """Legs of all segments from k on, from x, y in m: places and the segment each belongs to.
+
+        A leg that does not arrive is replaced by a detour; where that does not arrive either, the way ends.
+        """
+        places, segments = [(x, y)], [k]
+        for segment in range(k, len(self.goals)):
+            if segment > k:
+                self.detours.pop(segment, None)
+            leg, arrived = self.leg(segment, *places[-1])
+            if not arrived:
+                self.detour(segment)
+                leg, arrived = self.leg(segment, *places[-1])
+            if not arrived:
+                break
+            places += leg
+            segments += [segment] * len(leg)
+        return places, segments
+
+
+class Supervisor:
+    """Which segment is in force, and whether the robot gets on with it.
+
+    Attributes
+    ----------
+    active : int
+        The segment in force.
+    done : bool
+        Whether the last one has handed over.
+    pace : float
+        Share of the demonstrated speed. It is halved when there is no progress: the slower a robot, the more exactly it
+        can follow the direction of the law, whose Lyapunov measure falls everywhere, and so every segment hands over.
+    """
+
+    def __init__(self, guidance, speeds, robot):
+        self.guidance, self.limits, self.period = guidance, robot.limits, robot.period
+        self.speeds = [min(max(float(speed), LEAST_SPEED), robot.limits.speed) for speed in speeds]
+        self.active, self.done, self.hopeless = 0, False, False
+        self.last = robot.pose[:2]
+        self.restart()
+
+    def restart(self):
+        """Begin the segment in force: at its full pace, without a detour, with all the time in the world."""
+        self.pace, self.best, self.waited = 1.0, float("inf"), 0.0
+        self.guidance.detours.pop(self.active, None)
+
+    def notice_kidnapping(self, x, y):
+        """Begin the segment in force afresh where the robot finds itself elsewhere."""
+        if distance(self.last, x, y) > JUMP:
+            self.restart()
+        self.last = x, y
+
+    def expect_progress(self, remaining, least):
+        """Insist where `remaining` has not fallen by more than `least` for some time."""
+        self.waited += self.period
+        if remaining < self.best - least:
+            self.best, self.waited = remaining, 0.0
+        elif self.waited > PATIENCE:
+            self.insist()
+
+    def insist(self):
+        """Take a detour; if there is one already, halve the pace; if that is very low already, give up."""
+        self.best, self.waited = float("inf"), 0.0
+        if self.guidance.obstacles and self.active not in self.guidance.detours:
+            self.guidance.detour(self.active)
+        else:
+            self.pace /= 2
+            self.hopeless = self.pace < SLOWEST
+
+    def hand_over(self, segment):
+        """Put `segment` in force."""
+        self.done = segment == len(self.speeds)
+        if not self.done:
+            self.active = segment
+            self.restart()
+
+    def safe(self, speed, x, y, theta):
+        """The speed in m/s, or less where it could not be braked in time."""
+        if not self.guidance.obstacles:
+            return speed
+        return min(speed, self.guidance.obstacles.speed_limit(x, y, theta, self.limits.acceleration, self.period))
+
+
+class Plain(Supervisor):
+    """Turn towards the law's direction, drive at the demonstrated speed: v = s max(0, cos e), omega = 2 e."""
+
+    def command(self, x, y, theta):
+        """v in m/s and omega in rad/s for a pose."""
+        self.notice_kidnapping(x, y)
+        if self.guidance.reached(self.active, x, y, REACH):
+            self.hand_over(self.active + 1)
+        remaining = self.guidance.remaining(self.active, x, y)
+        self.expect_progress(remaining, 0.02 * min(remaining, 1.0))
+        ux, uy = self.guidance.direction(self.active, x, y)
+        if ux == uy == 0.0:
+            return 0.0, 0.0
+        error = wrap(atan2(uy, ux) - theta)
+        speed = 0.0 if abs(error) > SHARP else self.speeds[self.active] * self.pace * cos(error)
+        return self.safe(speed, x, y, theta), clip(2 * error, self.limits.turn)
+
+
+class Pursuit(Supervisor):
+    """Pursue a point 0.35 m ahead on the response, no faster than the robot can turn there.
+
+    The circle through robot and point has the curvature 2 sin(e) / distance (Coulter, "Implementation of the pure
+    pursuit path tracking algorithm", CMU-RI-TR-92-01).
+    """
+
+    places = ((float("inf"), float("inf")),)  # no response yet: any pose is astray
+    at = 0
+
+    def plan(self, x, y):
+        """Roll the response out from x, y in m; beyond its end it goes straight on, for something to pursue."""
+        self.places, self.segments = self.guidance.way(self.active, x, y)
+        self.at, self.end = 0, len(self.places) - 1
+        ux, uy = self.guidance.direction(len(self.speeds) - 1, *self.places[max(self.end - 1, 0)])
+        last_x, last_y = self.places[-1]
+        self.places += [(last_x + i * STEP * ux, last_y + i * STEP * uy) for i in range(1, LOOK_AHEAD + 1)]
+        demonstrated = np.array(self.speeds)[self.segments + [len(self.speeds) - 1] * LOOK_AHEAD]
+        self.planned = bend_speeds(np.array(self.places), demonstrated, self.limits).tolist()
+
+    def command(self, x, y, theta):
+        """v in m/s and omega in rad/s for a pose."""
+        self.notice_kidnapping(x, y)
+        if distance(self.places[self.at], x, y) > STRAY:
+            self.plan(x, y)
+        self.advance(x, y)
+        ahead_x, ahead_y = self.places[self.at + LOOK_AHEAD]
+        error = wrap(atan2(ahead_y - y, ahead_x - x) - theta)
+        curvature = 2 * sin(error) / max(hypot(ahead_x - x, ahead_y - y), STEP)
+        speed = self.pace * min(self.planned[self.at], self.limits.turn / max(abs(curvature), 1e-9))
+        speed = self.safe(speed, x, y, theta)
+        self.expect_progress(self.end - self.at, 0)
+        if abs(error) > SHARP or speed == 0.0:
+            return 0.0, clip(2 * error, self.limits.turn)
+        return speed, curvature * speed
+
+    def insist(self):
+        """As any supervisor does, and roll the response out anew."""
+        super().insist()
+        self.places, self.at = Pursuit.places, 0
+
+    def advance(self, x, y):
+        """Move on along the response to the nearest place in the look-ahead, handing over where its segments do.
+
+        The whole look-ahead counts: before a sharp turn at a subgoal the next place may be farther off, and those after
+        the turn nearer.
+        """
+        window = range(min(self.at + LOOK_AHEAD, self.end), self.at - 1, -1)
+        self.at = min(window, key=lambda i: distance(self.places[i], x, y))
+        if self.segments[self.at] != self.active:
+            self.hand_over(self.segments[self.at])
+        last = len(self.speeds) - 1
+        if self.at == self.end and self.guidance.reached(last, x, y, REACH):
+            self.hand_over(len(self.speeds))
+
+
+def distance(place, x, y):
+    """Distance in m from a place (x, y) to another."""
+    return hypot(place[0] - x, place[1] - y)
+
+
+def bend_speeds(places, speeds, limits):
+    """Speed in m/s at which to pass each of (N, 2) places: as demonstrated, but such that bends can be turned.
+
+    A fifth of the turning rate stays in hand for corrections. Before a bend the speed falls no faster than it can.
+    """
+    steps = np.diff(places, axis=0)
+    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    headings = np.pad(headings, (3, 4), mode="edge")  # a corner at a subgoal is turned within 0.3 m
+    bends = np.abs(headings[6:] - headings[:-6]) / (6 * STEP)
+    speeds = np.minimum(speeds, 0.8 * limits.turn / np.maximum(bends, 1e-9))
+    braked = 2 * limits.acceleration * STEP * np.arange(len(places))  # v^2 falls by 2 a s over s
+    return np.sqrt(np.minimum.accumulate((speeds**2 + braked)[::-1])[::-1] - braked)
+
+
+CONTROL_LAWS = {"plain": Plain, "pursuit": Pursuit}

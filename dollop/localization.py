@@ -1,0 +1,297 @@
+"""Monte Carlo localisation: where the robot is, from odometry and laser on the background map (CARMEN's part).
+
+Particles move by the odometry and its error, and are weighed by a likelihood field: a beam that ends at distance d from
+the nearest thing on the map has
+
+    q(d) = exp(-d^2 / (2 sigma^2)),    likelihood = floor + (1 - floor) q(d),
+
+so that whatever is not on the map costs no more than the floor: a person, a trash can, a mixed pixel.
+
+A kidnapping is noticed by the fit of a scan, the mean q of its beams at the pose: it falls below its long average, as
+in augmented Monte Carlo localisation (Thrun, Burgard and Fox, "Probabilistic Robotics", 2005, sec. 8.3.5). The
+particles are then drawn anew from the scan itself (Lenser and Veloso, "Sensor resetting localization for poorly
+modelled mobile robots", ICRA 2000): every pose of a lattice over the free cells is weighed. A room may look alike from
+two sides to a laser that sees half of it, so a pose that was searched for is believed only when it has explained every
+scan of half a turn.
+"""
+
+from math import pi
+
+import numpy as np
+from scipy import ndimage
+
+from dollop.avoidance import FREE_BELOW, covered_cells
+
+SIGMA, WIDE_SIGMA = 0.10, 0.20
+"""Standard deviation in m of the likelihood field: for particles, and for a lattice, which misses the true pose."""
+FLOOR = 0.10
+"""Likelihood of a beam that the map does not explain."""
+INDEPENDENT = 0.3
+"""Share of the beams that count: neighbours err together, where the map is wrong."""
+BEAM_STEP = 3
+"""Every which beam is used (CARMEN: one in three degrees)."""
+LATTICE, HEADINGS = 0.15, 72
+"""Distance in m between the poses of the lattice, and how many headings each place has."""
+TRACKING, SEARCHING = 250, 3000
+"""Numbers of particles: while they agree (CARMEN's), and while they do not."""
+NARROW = (0.15, 0.15)
+"""Standard deviations in m and rad below which particles agree."""
+BELIEVED_AFTER, GIVEN_UP_AFTER = pi, 4 * pi
+"""Angles in rad to turn until a pose that explains every scan is believed, and until the search starts anew."""
+LOST = 0.65
+"""Share of its long average below which the fit of a scan is in doubt."""
+DOUBTS = 3
+"""Scans in doubt, one after the other, that make a kidnapping."""
+USUAL_FIT, FORGETTING = 0.8, 0.01
+"""Long average of the fit to begin with, and its gain per scan."""
+
+
+class MonteCarloLocalizer:
+    """Particles that follow a robot, notice when it has been moved, and find it again.
+
+    Parameters
+    ----------
+    background : OccupancyGrid
+        The map.
+    angles : (B,) array
+        Bearing of each beam in rad.
+    environment : Environment, optional
+        Boxes that are known to stand there as well.
+    pose : (3,) sequence of float, optional
+        Where the robot starts: x, y in m, theta in rad. Without it, it has to find itself first.
+    laser_offset : float
+        Laser ahead of the robot's centre of rotation in m.
+    seed : int or numpy.random.Generator
+
+    Attributes
+    ----------
+    pose : (3,) float array
+        Mean of the particles; NaN before the first scan if none was given.
+    spread : (2,) float array
+        Standard deviation of the particles in m, in the plane, and in rad.
+    fit : float
+        Mean q of the last scan at the pose: how well the map explains it, from 0 to 1.
+    converged : bool
+        Whether the pose is followed, and not searched for.
+
+    Raises
+    ------
+    ValueError
+        If the pose is not finite, or the map has no free cell to search.
+    """
+
+    def __init__(self, background, angles, environment=None, pose=None, laser_offset=0.0, seed=0):
+        self.rng = np.random.default_rng(seed)
+        self.bearings, self.laser_offset = np.asarray(angles, dtype=float)[::BEAM_STEP], laser_offset
+        blocked = background.occupied
+        if environment is not None:
+            boxes = environment.boxes
+            blocked = blocked | covered_cells(boxes, background.origin, background.resolution, blocked.shape)
+        free = (background.occupancy < FREE_BELOW) & ~blocked
+        if not free.any():
+            raise ValueError("the background must have a free cell for the robot to be in, got none")
+        distances = ndimage.distance_transform_edt(~blocked, sampling=background.resolution)
+        self.field = LikelihoodField(distances, SIGMA, background.origin, background.resolution)
+        self.wide_field = LikelihoodField(distances, WIDE_SIGMA, background.origin, background.resolution)
+        self.lattice = lattice(free, background)
+        self.usual_fit = USUAL_FIT
+        self.pose, self.spread, self.fit = np.full(3, np.nan), np.full(2, np.inf), 0.0
+        if pose is None:
+            self.search()
+        else:
+            self.start(pose)
+
+    @property
+    def localised(self):
+        """Whether the pose is to be believed: converged, and the last scan not in doubt."""
+        return self.converged and self.doubts == 0
+
+    def start(self, pose, spread=(0.05, 0.05)):
+        """Believe a pose (3,), with standard deviations in m and rad."""
+        self.pose, self.spread, self.fit = np.array(pose, dtype=float), np.array(spread), self.usual_fit
+        if not np.isfinite(self.pose).all():
+            raise ValueError(f"pose must be finite, got {tuple(pose)}")
+        self.particles = self.pose + self.rng.standard_normal((TRACKING, 3)) * [spread[0], spread[0], spread[1]]
+        self.converged, self.doubts = True, 0
+
+    def search(self):
+        """Believe nothing; the next scan draws the particles."""
+        self.particles, self.converged, self.doubts = None, False, 0
+        self.turned = self.agreed = 0.0
+
+    def update(self, motion, ranges):
+        """Take in what happened in one control period.
+
+        Parameters
+        ----------
+        motion : (3,) sequence of float
+            By odometry, as `motion_between` has it.
+        ranges : (B,) array
+            The scan after it in m, `inf` where nothing came back.
+        """
+        ends = self.beam_ends(np.asarray(ranges, dtype=float))
+        moved = bool(np.abs(motion).max() > 1e-4)
+        if self.particles is None:
+            self.particles = self.draw(ends)
+        elif moved:
+            self.particles = moved_particles(self.particles, motion, self.rng)
+        weights = softmax(INDEPENDENT * self.field.log_likelihoods(self.particles, ends))
+        self.pose, self.spread = mean_pose(self.particles, weights)
+        self.fit = float(self.field.values(self.pose[None], ends).mean()) if len(ends) else 0.0
+        if moved:  # the same view again would be no new evidence
+            self.particles = self.resampled(weights)
+        self.judge(abs(motion[2]))
+
+    def judge(self, turn):
+        """Doubt a pose that was believed, or believe one that was searched for, after a turn of so many rad."""
+        fits = self.fit >= LOST * self.usual_fit
+        if self.converged:
+            self.doubts = 0 if fits else self.doubts + 1
+            self.usual_fit += FORGETTING * (self.fit - self.usual_fit) if fits else 0.0
+            if self.doubts >= DOUBTS:
+                self.search()
+            return
+        self.turned += turn
+        self.agreed = self.agreed + turn if fits and self.agreeing else 0.0
+        self.converged = self.agreed >= BELIEVED_AFTER
+        if not self.converged and self.turned > GIVEN_UP_AFTER:
+            self.search()
+
+    @property
+    def agreeing(self):
+        """Whether the particles agree on one pose."""
+        return bool((self.spread < NARROW).all())
+
+    def beam_ends(self, ranges):
+        """Where the used beams end in the robot's frame: (M, 2) in m."""
+        ranges = ranges[::BEAM_STEP]
+        back = np.isfinite(ranges)
+        directions = np.column_stack([np.cos(self.bearings[back]), np.sin(self.bearings[back])])
+        return ranges[back, None] * directions + [self.laser_offset, 0.0]
+
+    def draw(self, ends):
+        """Particles (N, 3) drawn from the scan: lattice poses by their likelihood, spread over their meshes."""
+        headings = np.arange(HEADINGS) * (2 * pi / HEADINGS)
+        scores = [self.wide_field.lattice_log_likelihoods(self.lattice, heading, ends[::2]) for heading in headings]
+        chances = softmax(2 * INDEPENDENT * np.concatenate(scores))
+        heading, place = np.divmod(self.rng.choice(len(chances), SEARCHING, p=chances), len(self.lattice))
+        meshes = self.rng.uniform(-0.5, 0.5, (SEARCHING, 3)) * [LATTICE, LATTICE, 2 * pi / HEADINGS]
+        return np.column_stack([self.lattice[place], headings[heading]]) + meshes
+
+    def resampled(self, weights):
+        """Particles (N, 3) drawn with the weights by one comb, few if they agree."""
+        count = TRACKING if self.agreeing else SEARCHING
+        comb = (np.arange(count) + self.rng.random()) / count
+        chosen = np.searchsorted(np.cumsum(weights), comb).clip(max=len(weights) - 1)
+        return self.particles[chosen]
+
+
+class LikelihoodField:
+    """q of beam ends anywhere, by looking it up.
+
+    Parameters
+    ----------
+    distances : (H, W) float array
+        From each cell to the nearest thing on the map in m.
+    sigma : float
+        m.
+    origin : (float, float)
+        Lower left corner of the map in m.
+    resolution : float
+        Side of a cell in m.
+    """
+
+    def __init__(self, distances, sigma, origin, resolution):
+        self.reach = resolution * np.hypot(*distances.shape)  # a beam longer than that ends on the map from nowhere
+        border = int(np.ceil(self.reach / resolution)) + 2  # so wide that no beam from the map ends beyond it
+        table = np.pad(np.exp(-0.5 * (distances / sigma) ** 2), border).astype(np.float32)
+        self.columns, self.table = table.shape[1], table.ravel()
+        self.log_table = np.log(FLOOR + (1 - FLOOR) * self.table)
+        self.origin, self.resolution = np.array(origin) - border * resolution, resolution
+        self.low = np.array(origin)
+        self.high = self.low + resolution * (np.array(distances.shape)[::-1] - 1)
+
+    def values(self, poses, ends):
+        """q (N, M) of beams that end at (M, 2) in the frame of each of (N, 3) poses."""
+        return self.table[self.cells(poses, ends)]
+
+    def log_likelihoods(self, poses, ends):
+        """Sum over the beams (M, 2) of log(floor + (1 - floor) q), for (N, 3) poses: (N,)."""
+        return self.log_table[self.cells(poses, ends)].sum(axis=1)
+
+    def lattice_log_likelihoods(self, places, heading, ends):
+        """The same for places (N, 2) that share a heading in rad; beams are moved by whole cells, which is faster."""
+        here = self.cells(np.column_stack([places, np.zeros(len(places))]), np.zeros((1, 2)))
+        there = np.rint(self.within_reach(ends) @ turn_matrix(heading).T / self.resolution).astype(np.int32)
+        return self.log_table[here + (there[:, 1] * self.columns + there[:, 0])].sum(axis=1)
+
+    def cells(self, poses, ends):
+        """Flat index (N, M) of the cell where each beam ends."""
+        places = (poses[:, :2].clip(self.low, self.high) - self.origin) / self.resolution
+        cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
+        ahead, left = self.within_reach(ends).T / self.resolution
+        columns = (places[:, :1] + cos * ahead - sin * left).astype(np.int32)
+        rows = (places[:, 1:] + sin * ahead + cos * left).astype(np.int32)
+        return rows * self.columns + columns
+
+    def within_reach(self, ends):
+        """Beam ends (M, 2), those that are farther than the map is wide drawn in."""
+        lengths = np.hypot(*ends.T)
+        return ends * np.minimum(1.0, self.reach / np.maximum(lengths, 1e-9))[:, None]
+
+
+def lattice(free, background):
+    """Places (N, 2) in m every 15 cm in the free cells (H, W) of a map."""
+    stride = max(1, round(LATTICE / background.resolution))
+    cells = np.argwhere(free[::stride, ::stride]) * stride
+    return background.cell_centres(cells if len(cells) else np.argwhere(free))
+
+
+def moved_particles(particles, motion, rng):
+    """Particles (N, 3) after a motion (3,) by odometry, each with an error of its own.
+
+    Standard deviations: 10 % of the way and 2 mm, 10 % of the turn, 3 degrees per m and 0.1 degrees.
+    """
+    ahead, left, turn = motion
+    way = np.hypot(ahead, left)
+    along, across = 0.10 * way + 0.002, 0.05 * way + 0.002
+    errors = rng.standard_normal((len(particles), 3)) * [along, across, 0.10 * abs(turn) + 0.05 * way + 0.002]
+    middle = particles[:, 2] + turn / 2
+    steps = errors + [ahead, left, turn]
+    moved = particles + steps
+    moved[:, 0] = particles[:, 0] + np.cos(middle) * steps[:, 0] - np.sin(middle) * steps[:, 1]
+    moved[:, 1] = particles[:, 1] + np.sin(middle) * steps[:, 0] + np.cos(middle) * steps[:, 1]
+    return moved
+
+
+def motion_between(before, after):
+    """What happened between two poses (3,) of the odometry: m ahead and to the left, seen from half the turn, and rad.
+
+    Examples
+    --------
+    >>> motion_between((1.0, 1.0, np.pi / 2), (1.0, 3.0, np.pi / 2)).round(6).tolist()
+    [2.0, 0.0, 0.0]
+    """
+    dx, dy, turn = np.subtract(after, before)
+    turn = pi - (pi - turn) % (2 * pi)
+    return np.array([*(turn_matrix(-before[2] - turn / 2) @ (dx, dy)), turn])
+
+
+def turn_matrix(angle):
+    """Rotation by an angle in rad: (2, 2)."""
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def softmax(scores):
+    """exp(scores), divided by its sum."""
+    shares = np.exp(scores - scores.max())
+    return shares / shares.sum(dtype=float)
+
+
+def mean_pose(particles, weights):
+    """Weighted mean pose (3,) of particles (N, 3), and their spread (2,) in m and rad."""
+    place = weights @ particles[:, :2]
+    resultant = weights @ np.exp(1j * particles[:, 2])
+    plane = np.sqrt(weights @ ((particles[:, :2] - place) ** 2).sum(axis=1))
+    turn = np.sqrt(max(0.0, -2 * np.log(max(abs(resultant), 1e-12))))  # circular standard deviation
+    return np.array([*place, np.angle(resultant)]), np.array([plane, turn])

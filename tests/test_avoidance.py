@@ -1,0 +1,157 @@
+"""The obstacle-aware modulation: unchanged where nothing is near, never into an obstacle, always out of a trap."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dollop.avoidance import INFLUENCE, KEPT, Geodesic, ObstacleMap
+from dollop.environment import Environment
+from dollop.gridmap import OccupancyGrid
+
+BOX = ObstacleMap.of(Environment([[-0.5, -0.5, 0.5, 0.5]]))
+angles = st.floats(-np.pi, np.pi)
+places = st.tuples(st.floats(-3, 3), st.floats(-3, 3))
+
+
+def unit(angle):
+    return float(np.cos(angle)), float(np.sin(angle))
+
+
+def trap():
+    """A map with a U that is open to the left, and the goal to the right of it."""
+    occupancy = np.zeros((120, 160))
+    occupancy[30:90, 100:104] = occupancy[30:34, 40:104] = occupancy[86:90, 40:104] = 1
+    return OccupancyGrid(occupancy, (0.0, 0.0), 0.05)
+
+
+def test_edge_is_distance_less_radius():
+    """Straight before a side of the box, the robot's edge is as far as geometry says, to a cell."""
+    for x in (0.9, 1.5, 2.5):
+        assert BOX.edge(x, 0.0) == pytest.approx(x - 0.5 - 0.25, abs=0.01)
+
+
+def test_edges_agree_with_edge():
+    """Asking for many places at once answers as asking for each."""
+    points = np.random.default_rng(0).uniform(-3, 3, (50, 2))
+    assert BOX.edges(points) == pytest.approx([BOX.edge(x, y) for x, y in points])
+
+
+def test_inside_is_negative():
+    """In the middle of the box the distance is that to its side, negative."""
+    assert BOX.edge(0.0, 0.0) + BOX.radius == pytest.approx(-0.5, abs=0.06)
+
+
+def test_unknown_and_beyond_the_map_are_obstacles():
+    """With a background, what no beam has seen is not driven on, and neither is the map's border."""
+    occupancy = np.zeros((100, 100))
+    occupancy[40:60, 40:60] = np.nan
+    obstacles = ObstacleMap.of(Environment(np.empty((0, 4))), OccupancyGrid(occupancy, (0.0, 0.0), 0.05))
+    assert obstacles.edge(2.5, 2.5) < -0.25
+    assert obstacles.edge(0.3, 2.5) < 0.05
+    assert obstacles.holds(4.99, 0.01) and not obstacles.holds(5.01, 0.01)
+
+
+def test_open_world_has_no_edge():
+    """Without boxes and background nothing is near anywhere."""
+    assert ObstacleMap.of(Environment(np.empty((0, 4)))).edge(0.0, 0.0) > 100
+
+
+@given(places, angles)
+def test_unchanged_where_nothing_is_near(place, angle):
+    """Beyond the influence the direction comes back as it was, to the last bit."""
+    if BOX.edge(*place) >= INFLUENCE:
+        assert BOX.modulate(*place, *unit(angle)) == unit(angle)
+
+
+@given(places, angles)
+def test_unchanged_when_leaving(place, angle):
+    """A direction away from the obstacle is not touched."""
+    _, nx, ny = BOX.edge_and_slope(*place)
+    ux, uy = unit(angle)
+    if nx * ux + ny * uy >= 0:
+        assert BOX.modulate(*place, ux, uy) == (ux, uy)
+
+
+@given(places, angles)
+def test_never_towards_what_is_at_the_kept_distance(place, angle):
+    """At the kept distance or nearer, the modulated direction, of unit length, does not point into the obstacle."""
+    edge, nx, ny = BOX.edge_and_slope(*place)
+    if edge <= KEPT and nx * nx + ny * ny > 0.5:
+        ux, uy = BOX.modulate(*place, *unit(angle))
+        assert np.hypot(ux, uy) == pytest.approx(1)
+        assert nx * ux + ny * uy >= -1e-9
+
+
+@given(angles, angles)
+def test_flow_keeps_clear_of_a_convex_obstacle(bearing, offset):
+    """Straight flows towards a place behind the box go round it and never nearer than about the kept distance."""
+    x, y = 2.5 * np.cos(bearing), 2.5 * np.sin(bearing)
+    goal = (-2.5 * np.cos(bearing + offset / 4), -2.5 * np.sin(bearing + offset / 4))
+    for _ in range(300):
+        way = np.hypot(goal[0] - x, goal[1] - y)
+        if way < 0.05:
+            break
+        ux, uy = BOX.modulate(x, y, (goal[0] - x) / way, (goal[1] - y) / way)
+        x, y = x + 0.03 * ux, y + 0.03 * uy
+        assert BOX.edge(x, y) > KEPT - 0.05
+
+
+@given(places, angles, st.floats(0.3, 3.0))
+def test_speed_limit_leaves_room_to_brake(place, theta, deceleration):
+    """One period at the limit and then braking takes no more than the room there is; in contact, only outwards."""
+    limit = BOX.speed_limit(*place, theta, deceleration, 0.1)
+    edge, nx, ny = BOX.edge_and_slope(*place)
+    if edge > 0.02:
+        assert limit * 0.1 + limit**2 / (2 * deceleration) <= edge + 1e-9
+    else:
+        assert limit == 0.0 or nx * np.cos(theta) + ny * np.sin(theta) > 0
+
+
+def test_geodesic_is_the_distance_in_the_open():
+    """Where nothing is near, the way is the straight one, but for the eight directions of a grid (8 %)."""
+    far = ObstacleMap.of(Environment([[-9, -9, -8, -8]]), places=[[0, 0], [4, 3]])
+    way = Geodesic(far, (0.0, 0.0))
+    for place in ((3.0, 0.0), (2.0, 2.0), (4.0, 1.5)):
+        assert np.hypot(*place) - 0.08 <= way.distance(*place) <= 1.09 * np.hypot(*place)
+
+
+def test_geodesic_against_brute_force():
+    """The distances are those of relaxing all neighbours until nothing changes."""
+    small = OccupancyGrid(np.pad(np.zeros((26, 30)), 1, constant_values=1), (0.0, 0.0), 0.05)
+    way = Geodesic(ObstacleMap.of(Environment([[0.5, 0.6, 0.6, 0.7]]), small), (1.1, 0.4))
+    costs = way.obstacles.neighbours.toarray()
+    costs = np.where(costs + costs.T > 0, costs + costs.T, np.inf)
+    distances = np.full(len(costs), np.inf)
+    distances[way.goal_cell] = 0.0
+    for _ in range(200):
+        distances = np.minimum(distances, (costs + distances).min(axis=1))
+    assert np.array(way.distances) == pytest.approx(distances)
+
+
+def test_geodesic_leads_out_of_a_trap():
+    """From inside a U, where turning along the wall comes to a halt, the way leads out, round and to the goal."""
+    obstacles = ObstacleMap.of(Environment(np.empty((0, 4))), trap())
+    way, (x, y) = Geodesic(obstacles, (7.0, 3.0)), (4.0, 3.0)
+    for _ in range(600):
+        ux, uy = way.direction(x, y)
+        x, y = x + 0.03 * ux, y + 0.03 * uy
+        assert obstacles.edge(x, y) > 0
+    assert np.hypot(x - 7.0, y - 3.0) < 0.1
+
+
+def test_geodesic_to_a_walled_place():
+    """Where there is no way, its length is infinite and it has no direction."""
+    occupancy = np.zeros((100, 100))
+    occupancy[:, 48:52] = 1
+    grid = OccupancyGrid(occupancy, (0.0, 0.0), 0.05)
+    way = Geodesic(ObstacleMap.of(Environment(np.empty((0, 4))), grid), (1.0, 2.5))
+    assert way.distance(4.0, 2.5) == np.inf
+    assert way.direction(4.0, 2.5) == (0.0, 0.0)
+
+
+def test_geodesic_to_a_place_too_near_to_something():
+    """The way to a place where the robot has no room ends at the nearest place where it has."""
+    way = Geodesic(BOX, (0.6, 0.0))
+    assert BOX.edge(*way.goal) > 0
+    assert np.hypot(way.goal[0] - 0.6, way.goal[1]) < 0.35

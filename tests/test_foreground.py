@@ -1,0 +1,185 @@
+"""Sec. II: foreground cells, the autoregressive foreground grid, blobs and foreground objects."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dollop.foreground import (
+    ForegroundGrid,
+    blob_centroids,
+    bounding_boxes,
+    endpoints,
+    find_blobs,
+    foreground_mask,
+    seen_free,
+    surface_points,
+)
+from dollop.gridmap import OccupancyGrid
+from dollop.laser import LaserLog
+
+ANGLES = np.radians(np.arange(-90.0, 91.0))
+
+
+def room(side=8.0, resolution=0.05):
+    """A square room with walls on its border, lower left corner at the origin."""
+    n = round(side / resolution)
+    occupancy = np.zeros((n, n))
+    occupancy[[0, -1], :] = occupancy[:, [0, -1]] = 1.0
+    return OccupancyGrid(occupancy, np.zeros(2), resolution)
+
+
+def scan_of(ranges, pose=(4.0, 0.5, np.pi / 2)):
+    ranges = np.atleast_2d(ranges)
+    return LaserLog(0.1 * np.arange(len(ranges)), ranges, ANGLES, np.tile(pose, (len(ranges), 1)), 20.0)
+
+
+def hits(grid, x, y):
+    """Flat cell of a point."""
+    return np.array([int(y / grid.resolution) * grid.shape[1] + int(x / grid.resolution)])
+
+
+def test_endpoints_lie_at_range_and_bearing():
+    """Readings are put into the world through the sensor's pose; what did not come back has no place."""
+    log = scan_of(np.full(181, 2.0))
+    points = endpoints(log)[0]
+    np.testing.assert_allclose(points[[0, 90, 180]], [[6, 0.5], [4, 2.5], [2, 0.5]], atol=1e-12)
+    assert np.isnan(endpoints(scan_of(np.full(181, np.inf)))).all()
+
+
+def test_foreground_is_what_the_map_does_not_explain_within_the_radius():
+    """Readings nearer than the background radius to a wall are background, the others are foreground."""
+    points = np.array([[[4.0, 7.95], [4.0, 7.80], [4.0, 7.70], [4.0, 4.0], [np.nan, np.nan]]])
+    np.testing.assert_array_equal(foreground_mask(points, room()), [[False, False, True, True, False]])
+    np.testing.assert_array_equal(foreground_mask(points, room(), 0.5), [[False, False, False, True, False]])
+
+
+def test_a_map_that_does_not_cover_the_scans_is_refused():
+    """The error says how many readings lie outside; a stray one is not yet an error, nor foreground."""
+    points = np.full((1, 20, 2), 4.0)
+    points[0, 0] = 100.0
+    assert foreground_mask(points, room()).sum() == 19
+    points[0, :3] = 100.0
+    with pytest.raises(ValueError, match="3 of 20 readings"):
+        foreground_mask(points, room())
+
+
+@pytest.mark.parametrize("radius", [0.0, -0.2, np.nan])
+def test_background_radius_must_be_positive(radius):
+    """The error names the value."""
+    with pytest.raises(ValueError, match=f"background_radius must be positive, got {radius}"):
+        foreground_mask(np.full((1, 1, 2), 4.0), room(), radius)
+
+
+def test_surfaces_are_filled_between_neighbouring_beams_only():
+    """Gaps up to `jump` close to less than a cell; jumps, other beams and other scans stay apart."""
+    points = np.zeros((2, 4, 2))
+    points[..., 0] = [[0.0, 0.2, 1.0, 1.2], [5.0, 5.2, 5.4, 5.6]]
+    mask = np.array([[True, True, True, True], [True, False, True, True]])
+    scan, filled = surface_points(points, mask)
+    assert (np.diff(scan) >= 0).all()
+    assert np.diff(np.sort(filled[scan == 0, 0])).max() == pytest.approx(0.8)
+    assert not ((filled[:, 0] > 0.2 + 1e-9) & (filled[:, 0] < 1.0)).any()
+    assert not ((filled[:, 0] > 5.0) & (filled[:, 0] < 5.4)).any()
+    assert ((filled[:, 0] > 5.4) & (filled[:, 0] < 5.6)).sum() >= 3
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.floats(0.05, 1.0), st.lists(st.booleans(), min_size=1, max_size=12))
+def test_grid_follows_the_autoregression(gain, seen):
+    """A cell's value is g <- (1 - gain) g + gain hit, written out."""
+    grid = ForegroundGrid(room(), gain)
+    cell, expected = hits(grid, 4.0, 3.0), 0.0
+    for hit in seen:
+        ranges = np.full(181, 2.5 if hit else 6.0)
+        grid.update(cell if hit else cell[:0], np.array([4.0, 0.5, np.pi / 2]), ANGLES, ranges)
+        expected = (1 - gain) * expected + gain * hit
+        expected = 0.0 if expected < 0.5 * gain else expected
+        assert grid.value[cell[0]] == pytest.approx(expected)
+
+
+def test_the_shadow_is_not_erased():
+    """A can behind the user keeps its cells; what a beam passes through fades."""
+    grid, pose = ForegroundGrid(room(), 0.6), np.array([4.0, 0.5, np.pi / 2])
+    can = hits(grid, 4.0, 3.0)
+    grid.update(can, pose, ANGLES, np.full(181, 2.5))
+    for _ in range(20):
+        grid.update(can[:0], pose, ANGLES, np.full(181, 1.0))
+    assert grid.value[can[0]] == pytest.approx(0.6)
+    for _ in range(3):
+        grid.update(can[:0], pose, ANGLES, np.full(181, 6.0))
+    assert grid.value[can[0]] == 0.0
+
+
+def test_an_object_in_the_shadow_is_not_sensed():
+    """Remembered blobs that the scan did not meet are not offered to the tracker."""
+    grid, pose = ForegroundGrid(room(), 0.6), np.array([4.0, 0.5, np.pi / 2])
+    can = np.concatenate([hits(grid, 3.91 + 0.05 * k, 3.0) for k in range(4)])
+    grid.update(can, pose, ANGLES, np.full(181, 2.5))
+    np.testing.assert_allclose(grid.objects(), [[4.0, 3.025]])
+    grid.update(can[:0], pose, ANGLES, np.full(181, 1.0))
+    assert len(grid.blobs()) == 1 and len(grid.objects()) == 0
+
+
+def test_seen_free_knows_beam_range_and_field_of_view():
+    """Before the reading is free; behind it, or behind the sensor, is not."""
+    points = np.array([[4.0, 2.0], [4.0, 3.2], [4.0, 0.1], [5.0, 0.6]])
+    free = seen_free(points, np.array([4.0, 0.5, np.pi / 2]), ANGLES, np.full(181, 2.5))
+    np.testing.assert_array_equal(free, [True, False, False, True])
+
+
+cells = st.sets(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=40)
+
+
+@settings(deadline=None)
+@given(cells)
+def test_blobs_are_the_connected_components(occupied):
+    """Blobs equal those of a plain flood fill over eight neighbours, small ones left out."""
+    blobs = find_blobs(np.array(sorted(occupied), int).reshape(-1, 2), 0.05)
+    expected, left = [], set(occupied)
+    while left:
+        blob, front = set(), [left.pop()]
+        while front:
+            r, c = front.pop()
+            blob.add((r, c))
+            near = {(r + i, c + j) for i in (-1, 0, 1) for j in (-1, 0, 1)} & left
+            left -= near
+            front += near
+        if len(blob) >= 4:
+            expected.append(frozenset(blob))
+    found = {frozenset(map(tuple, blobs.cells[blobs.labels == k].tolist())) for k in range(len(blobs))}
+    assert found == set(expected)
+    for k in range(len(blobs)):
+        inside = blobs.cells[blobs.labels == k]
+        centroid = blob_centroids(blobs.cells, blobs.labels, np.zeros(2), 0.05)[k]
+        np.testing.assert_allclose(centroid, 0.05 * (inside.mean(axis=0)[::-1] + 0.5))
+        assert blobs.areas[k] == pytest.approx(len(inside) * 0.0025)
+
+
+def test_min_area_is_a_hundred_square_centimetres():
+    """Four cells of 5 cm make a foreground object, three do not (Sec. II)."""
+    row = np.column_stack([np.zeros(4, int), np.arange(4)])
+    assert len(find_blobs(row, 0.05)) == 1
+    assert len(find_blobs(row[:3], 0.05)) == 0
+
+
+def test_boxes_envelop_their_blobs():
+    """A box reaches from the outer edge of the first cell to that of the last."""
+    blobs = find_blobs(np.array([[2, 3], [2, 4], [3, 4], [4, 5]]), 0.1)
+    np.testing.assert_allclose(bounding_boxes(blobs, np.array([1.0, 2.0]), 0.1), [[1.3, 2.2, 1.6, 2.5]])
+
+
+def test_legs_within_a_stride_are_one_object():
+    """Two blobs are two objects, or one where the stride says so, its centroid between them."""
+    grid, pose = ForegroundGrid(room(), 0.6), np.array([4.0, 0.5, np.pi / 2])
+    legs = np.concatenate([hits(grid, x + 0.05 * k, 3.0) for x in (3.51, 4.01) for k in range(4)])
+    grid.update(legs, pose, ANGLES, np.full(181, 2.5))
+    assert len(grid.objects()) == 2 and len(grid.objects(stride=0.4)) == 2
+    np.testing.assert_allclose(grid.objects(stride=0.6), [[3.85, 3.025]])
+
+
+@pytest.mark.parametrize("gain", [0.0, -1.0, 1.5, np.nan])
+def test_gain_out_of_range_is_named(gain):
+    """The error names the value and the rule."""
+    with pytest.raises(ValueError, match=r"gain must lie in \(0, 1\]"):
+        ForegroundGrid(room(), gain)

@@ -1,0 +1,125 @@
+"""Sec. II end to end: from a laser log to the user and the environment, and what happens to bad input."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dollop import OccupancyGrid, SequencedLDS, Tracker, laps, observe, read_log
+from dollop.lab import Recording
+from dollop.lab.truth import track_error
+from dollop.observation import completed
+from dollop.trajectory import distance_to_polyline, mean_trajectory
+
+DATA = Path(__file__).parents[1] / "data"
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return Recording.load(DATA / "figure_eights.log.gz")
+
+
+@pytest.fixture(scope="module")
+def background():
+    return OccupancyGrid.load(DATA / "lab.yaml")
+
+
+@pytest.fixture(scope="module")
+def observation(recording, background):
+    return observe(recording.log, background)
+
+
+def test_the_user_is_tracked_through_the_occlusions(recording, observation):
+    """Five laps: within 60 mm of the true walker on average, near-side bias out; never farther than 0.3 m."""
+    user = observation.user
+    bias, errors = track_error(user, recording.truth, recording.log.poses[0])
+    assert user.occluded.sum() > 20
+    assert user.t[-1] - user.t[0] > 0.97 * np.ptp(recording.log.t)
+    assert 0.05 < bias < 0.20
+    assert errors.mean() < 0.060 and errors.max() < 0.3
+
+
+def test_both_cans_are_the_environment(recording, observation):
+    """Two static objects, every side of their boxes within 10 cm of the truth."""
+    found = np.array(sorted(observation.environment.boxes.tolist()))
+    np.testing.assert_allclose(found, recording.scene.boxes, atol=0.10)
+
+
+def test_the_law_has_about_six_segments_within_twenty_millimetres(observation):
+    """Fig. 6b at the default tolerance (the paper: 6 LDS, 20 mm)."""
+    walked = laps(observation.user.t, observation.user.positions)
+    law = SequencedLDS.fit(walked)
+    assert len(walked) == 5
+    assert 5 <= len(law.segments) <= 7
+    assert distance_to_polyline(mean_trajectory(walked), law.response()).mean() <= 0.020
+
+
+def test_the_stored_map_is_what_the_stored_drive_builds(background):
+    """data/lab.yaml follows from data/empty_lab.log.gz."""
+    built = OccupancyGrid.from_log(read_log(DATA / "empty_lab.log.gz"))
+    assert (built.occupied == background.occupied).mean() > 0.999
+
+
+@pytest.mark.parametrize(
+    "tracker",
+    [
+        Tracker(matching="joint"),
+        Tracker(occlusion="particles"),
+        Tracker(motion=replace(Tracker().motion, order=3)),
+    ],
+    ids=["joint", "particles", "acceleration"],
+)
+def test_the_other_choices_track_the_user_as_well(recording, background, tracker):
+    """Beside the paper's choices, each selectable one follows the user for one lap."""
+    log = recording.log
+    first = replace(log, t=log.t[:250], ranges=log.ranges[:250], poses=log.poses[:250])
+    user = observe(first, background, tracker=tracker).user
+    assert track_error(user, recording.truth, log.poses[0])[1].mean() < 0.10
+
+
+def test_nobody_there(recording, background):
+    """A log of a standing room has no user, and an empty environment where nothing is foreground."""
+    log = recording.log
+    still = replace(log, t=log.t[:40], ranges=np.repeat(log.ranges[:1], 40, axis=0), poses=log.poses[:40])
+    assert observe(still, background).user is None
+    explained = replace(still, ranges=np.full_like(still.ranges, np.inf))
+    observation = observe(explained, background)
+    assert observation.tracks == () and len(observation.environment.boxes) == 0
+
+
+def test_observing_leaves_the_log_as_it_was(recording, background):
+    """Inputs are not changed."""
+    before = recording.log.ranges.copy(), recording.log.poses.copy()
+    observe(recording.log, background)
+    np.testing.assert_array_equal(recording.log.ranges, before[0])
+    np.testing.assert_array_equal(recording.log.poses, before[1])
+
+
+def test_a_map_elsewhere_is_refused(recording, background):
+    """A map that does not cover the scans is an error with the share of readings outside."""
+    elsewhere = OccupancyGrid(background.occupancy, np.array([50.0, 50.0]), background.resolution)
+    with pytest.raises(ValueError, match="must cover the scans: .* readings .100 %"):
+        observe(recording.log, elsewhere)
+
+
+def test_boxes_are_completed_away_from_the_sensor():
+    """Of a round can only the near arc is seen; its box is made as deep as it is wide, and no smaller than seen."""
+    angle = np.linspace(np.pi, 2 * np.pi, 50)
+    near = np.array([2.0, 3.0]) + 0.2 * np.column_stack([np.cos(angle), np.sin(angle)])
+    seen = np.concatenate([near.min(axis=0), near.max(axis=0)])
+    box = completed(seen, near, np.array([2.0, 0.0]), 0.0)
+    np.testing.assert_allclose(box, [1.8, 2.8, 2.2, 3.2], atol=0.01)
+
+
+@pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA names no folder")
+def test_walkers_seen_at_leg_height():
+    """In a real log three people pace up and down; with legs joined within a stride the user is followed all along."""
+    pytest.importorskip("rosbags")
+    folder = Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / "people"
+    log = read_log(folder / "demo_stationary_simple_environment.bag")
+    observation = observe(log, OccupancyGrid.from_log(log), min_area=0.0025, stride=0.6)
+    user = observation.user
+    assert user.t[-1] - user.t[0] > 100 and user.occluded.mean() < 0.15
+    assert np.ptp(user.positions[:, 1]) > 4.0 and np.quantile(user.speeds, 0.9) < 2.5
