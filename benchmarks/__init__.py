@@ -1,1 +1,1 @@
-"""What is timed, against whom: each bench_*.py has run() -> rows of name, median_s, baseline_s, ratio, bound."""
+"""What is timed, against whom: each bench_*.py has run(), which returns rows made by `benchmarks.timing.row`."""

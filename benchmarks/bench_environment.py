@@ -1,28 +1,18 @@
-"""Sec. IV timed: matching 8 and 1,000 corners, associating and relocating, beside plain Python in the same run."""
+"""Sec. IV timed: matching 8 and 1,000 corners, associating and relocating, beside plain Python in the same run.
+
+python -m benchmarks environment
+"""
 
 from itertools import permutations
 from math import ceil, hypot
-from statistics import median
-from time import perf_counter
 
 import numpy as np
-import pandas as pd
 from scipy.optimize import linear_sum_assignment
 
+from benchmarks.timing import row, seconds
 from dollop.association import associate
 from dollop.environment import Environment
 from dollop.matching import match
-
-
-def seconds(function, repeats):
-    """Median time of a call, after one that does not count."""
-    function()
-    times = []
-    for _ in range(repeats):
-        start = perf_counter()
-        function()
-        times.append(perf_counter() - start)
-    return median(times)
 
 
 def scene(objects, seed=0):
@@ -78,43 +68,22 @@ def plain_relocate(subgoals, before, after, m=4):
 
 
 def run():
-    """Rows of name, median_s, baseline_s, ratio, bound (s)."""
-    rows = []
+    """Time matching and association.
 
-    def row(name, ours, plain, bound, repeats, plain_repeats):
-        time, baseline = seconds(ours, repeats), seconds(plain, plain_repeats)
-        rows.append({"name": name, "median_s": time, "baseline_s": baseline, "ratio": baseline / time, "bound": bound})
-
+    Returns
+    -------
+    list of dict
+    """
     two, many = scene(2), scene(250)
     subgoals = np.random.default_rng(0).uniform(0, 30, (200, 2))
+    brute, _ = seconds(lambda: plain_permutations(*two), 3)
+    loops, _ = seconds(lambda: plain_assignment(*many), 1)
+    rows = []
     for method in ("literal", "robust"):
-        ours = {"method": method}
-        row(
-            f"match 8 corners, {method}",
-            lambda k=ours: match(*two, **k),
-            lambda: plain_permutations(*two),
-            2e-4,
-            300,
-            3,
-        )
-        row(
-            f"match 1000 corners, {method}",
-            lambda k=ours: match(*many, **k),
-            lambda: plain_assignment(*many),
-            0.5,
-            5,
-            1,
-        )
-    row(
-        "associate and relocate 200 subgoals, 1000 corners",
-        lambda: associate(subgoals, many[0]).relocate(many[1]),
-        lambda: plain_relocate(subgoals, *many),
-        0.1,
-        20,
-        3,
-    )
-    return rows
-
-
-if __name__ == "__main__":
-    print(pd.DataFrame(run()).to_string(index=False, float_format="{:.3g}".format))
+        few = seconds(lambda method=method: match(*two, method=method), 300)[0]
+        lots = seconds(lambda method=method: match(*many, method=method), 5)[0]
+        rows.append(row(f"match 8 corners, {method}", few, brute, 2e-4))
+        rows.append(row(f"match 1000 corners, {method}", lots, loops, 0.5))
+    tied = seconds(lambda: associate(subgoals, many[0]).relocate(many[1]), 20)[0]
+    plain = seconds(lambda: plain_relocate(subgoals, *many), 3)[0]
+    return [*rows, row("associate and relocate 200 subgoals, 1000 corners", tied, plain, 0.1)]

@@ -1,17 +1,11 @@
 """Sequenced LDS: how long the exact search takes, beside the same search with one segment after the other.
 
-python benchmarks/bench_lds.py
+python -m benchmarks lds
 """
-
-import os
-
-os.environ.update({name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")})
-
-import statistics
-import time
 
 import numpy as np
 
+from benchmarks.timing import row, seconds
 from dollop.lds import DECAY, HORIZON, LDS, STEPS, SequencedLDS, Statistics, fewest_segments
 from dollop.trajectory import align, distance_to_polyline, retime
 
@@ -40,49 +34,18 @@ def plain_fit(walks, tolerance=0.02):
     return len(fewest_segments(errors, tolerance)) - 1
 
 
-def seconds(call, repeats):
-    """Median duration of a call in s, and its last result."""
-    durations = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        result = call()
-        durations.append(time.perf_counter() - begin)
-    return statistics.median(durations), result
-
-
 def run(repeats=15):
     """Time `SequencedLDS.fit` on one lap and on five.
 
     Returns
     -------
     list of dict
-        name, median_s, baseline_s (the plain loop), ratio, bound (s), and the segments found by both.
     """
     rows = []
     for n, bound in BOUNDS.items():
         walks = laps(n)
-        SequencedLDS.fit(walks)
         median, law = seconds(lambda walks=walks: SequencedLDS.fit(walks), repeats)
-        baseline, plain = seconds(lambda walks=walks: plain_fit(walks), 1)
-        name = f"SequencedLDS.fit, {n} x {SAMPLES} samples"
-        found = {"segments": len(law.segments), "baseline_segments": plain}
-        rows.append(
-            {
-                "name": name,
-                "median_s": median,
-                "baseline_s": baseline,
-                "ratio": baseline / median,
-                "bound": bound,
-                **found,
-            }
-        )
+        baseline, segments = seconds(lambda walks=walks: plain_fit(walks), 1)
+        assert segments == len(law.segments), f"both must find the same, got {len(law.segments)} and {segments}"
+        rows.append(row(f"SequencedLDS.fit, {n} x {SAMPLES} samples", median, baseline, bound))
     return rows
-
-
-if __name__ == "__main__":
-    for row in run():
-        print(
-            "{name:40s} {median_s:7.3f} s  bound {bound:.1f} s  plain loop {baseline_s:6.2f} s  {ratio:5.0f} x".format(
-                **row
-            )
-        )

@@ -24,29 +24,47 @@ m                      how many of the closest corners a subgoal is tied to (Sec
 SI units throughout; a pose is (x, y, theta); time comes first in every array.
 """
 
+from dollop.association import Association, Frames, associate, associate_with_frames
+from dollop.cdhmm import SubgoalHMM
 from dollop.environment import Environment
+from dollop.execution import Run, Unicycle, perform
 from dollop.files import FormatError
 from dollop.gridmap import OccupancyGrid
 from dollop.laser import LaserLog
 from dollop.lds import LDS, SequencedLDS
 from dollop.logs import read_log, write_log
+from dollop.matching import Matching, match
 from dollop.observation import Observation, observe
+from dollop.task import Demonstration, Task, learn
 from dollop.tracking import Motion, Track, Tracker
 from dollop.trajectory import laps
 
 __all__ = [
     "LDS",
+    "Association",
+    "Demonstration",
     "Environment",
     "FormatError",
+    "Frames",
     "LaserLog",
+    "Matching",
     "Motion",
     "Observation",
     "OccupancyGrid",
+    "Run",
     "SequencedLDS",
+    "SubgoalHMM",
+    "Task",
     "Track",
     "Tracker",
+    "Unicycle",
+    "associate",
+    "associate_with_frames",
     "laps",
+    "learn",
+    "match",
     "observe",
+    "perform",
     "read_log",
     "write_log",
 ]

@@ -88,6 +88,15 @@ class Association:
             differences = differences @ _rotations(turn).T
         return np.einsum("km,kmd->kd", weights / totals, environment.corners[partners] + differences)
 
+    def carried(self, environment, matching=None):
+        """The same ties with the objects where they stand now: parameters as for `relocate`.
+
+        Relocating from it goes on from the demonstrated differences, so that moving objects there and back moves
+        nothing. Ties to objects that are gone are cut.
+        """
+        partners = self._indices(environment, matching)[self.corners]
+        return Association(environment, np.maximum(partners, 0), self.weights * (partners >= 0), self.differences)
+
     def _indices(self, environment, matching):
         n, m = len(self.environment.corners), len(environment.corners)
         if matching is None:

@@ -94,7 +94,7 @@ def gaussian_hmm(sequences, left_to_right=False, n_states=range(2, 11), restarts
         Random starts for each number of states.
     seed : int
     spread : float
-        What is expected of a state, standard deviation in m: the prior of the covariance, the same that merging is given.
+        Expected standard deviation of a state in m, its covariance's prior: the same that merging is given.
 
     Returns
     -------

@@ -17,8 +17,9 @@ The structure is one number per subgoal, its state; everything else follows from
     sum over states of   log p(subgoals of the state)                                      (Normal-inverse-Wishart)
   + sum over nodes of    log G(K_u) - log G(K_u + C_u) + sum over v of log G(c_uv + 1)     (Dirichlet, beta = 1)
 
-Two kinds of move raise it: merging two states, and aligning one whole demonstration afresh with what the others have
-built. The second undoes what best-first merging did too early, for instance where a path crosses itself.
+Best-first merging alone can err early, where a path crosses itself or an odd subgoal comes near a later one, and what
+it merged then keeps other pairs apart. So two moves follow, kept only if the evidence grows: all demonstrations are
+taken out and aligned with the growing graph one after another, and each is aligned afresh with what the others built.
 """
 
 import heapq
@@ -107,7 +108,8 @@ def _emission(n, s, q, prior, table):
     xx = prior.psi + q[..., 0] - s[..., 0] * s[..., 0] / kappa
     xy = q[..., 1] - s[..., 0] * s[..., 1] / kappa
     yy = prior.psi + q[..., 2] - s[..., 1] * s[..., 1] / kappa
-    return table[n] - 0.5 * (prior.nu + n) * np.log(xx * yy - xy * xy)
+    determinant = np.maximum(xx * yy - xy * xy, prior.psi**2)  # never less, but for rounding
+    return table[n] - 0.5 * (prior.nu + n) * np.log(determinant)
 
 
 def _transition(counts):
@@ -167,7 +169,7 @@ class _Merging:
         graph = _graph(labels, chains)
         self.n, self.s, self.q, self.counts = graph.n, graph.s, graph.q, graph.counts
         self.names = np.arange(len(self.n))
-        self.table = _emission_table(prior, len(labels))
+        self.table = _emission_table(prior, 2 * len(labels))
         self.log_factorial = gammaln(np.arange(4 * len(labels) + 1) + 1.0)
         self.reaches = _reachability(self.counts)
         self.blocked = self.reaches | self.reaches.T
@@ -235,6 +237,7 @@ class _Merging:
             total[v] = 0
         self.out[u], self.total[u] = np.count_nonzero(self.counts[u]), self.total[u] + self.total[v]
         self.out[v] = self.total[v] = 0
+        self.own[u] += self.own[v] + self.emission[u, v]
         self.out[forks] -= 1
         self.alone = self._dirichlet(self.out, self.total)
         self.labels[self.labels == self.names[v]] = self.names[u]
@@ -277,7 +280,7 @@ class _Merging:
 
     def _emission_gain(self, rows):
         n, s, q = self.n[rows, None] + self.n, self.s[rows, None] + self.s, self.q[rows, None] + self.q
-        together = _emission(np.minimum(n, len(self.table) - 1), s, q, self.prior, self.table)
+        together = _emission(n, s, q, self.prior, self.table)
         return together - self.own[rows, None] - self.own
 
     def _leaving_gain(self, rows, columns, block):
@@ -302,7 +305,6 @@ class _Merging:
 
     def _compute_node(self, u):
         """All pairs of a node that was just merged."""
-        self.own[u] = _emission(self.n[u], self.s[u], self.q[u], self.prior, self.table)
         self.emission[u] = self.emission[:, u] = self._emission_gain(np.array([u]))[0]
         after, before = self.counts[u].nonzero()[0], self.counts[:, u].nonzero()[0]
         c = self.counts[:, after]
@@ -519,12 +521,13 @@ def _improve(labels, chains, prior):
 
 
 def _structure(chains, prior):
-    """Labels (M,) by best-first merging, improved; then built anew from what that has taught, as often as it helps."""
-    labels = _improve(_merge(np.arange(len(chains.points)) + FIRST, chains, prior), chains, prior)
+    """Labels (M,) by best-first merging, built anew from what that has taught as often as it helps, and improved."""
+    labels = _compact(_merge(np.arange(len(chains.points)) + FIRST, chains, prior))
     while True:
         rebuilt = _improve(_rebuild(labels, chains, prior), chains, prior)
-        if _evidence(rebuilt, chains, prior) <= _evidence(labels, chains, prior) + LEAST_GAIN:
-            return labels
+        gain = _evidence(rebuilt, chains, prior) - _evidence(labels, chains, prior)
+        if gain <= LEAST_GAIN:
+            return rebuilt if gain > -LEAST_GAIN else _improve(labels, chains, prior)
         labels = rebuilt
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 from dollop import plot
 from dollop.files import whole_file
 from dollop.gridmap import OccupancyGrid
-from dollop.logs import read_log
+from dollop.logs import read_log, write_log
 from dollop.observation import observe
 
 
@@ -77,13 +77,17 @@ def observe_log(options):
 def record_data(options):
     """dollop data"""
     from dollop import experiments
-    from dollop.logs import write_log
 
     options.folder.mkdir(parents=True, exist_ok=True)
     write_log(options.folder / "empty_lab.log.gz", experiments.empty_lab())
     experiments.background_map().save(options.folder / "lab.yaml")
-    experiments.figure_eights().save(options.folder / "figure_eights.log.gz")
-    print(f"wrote empty_lab, lab and figure_eights into {options.folder}/")
+    recordings = {"figure_eights": experiments.figure_eights()}
+    recordings |= {f"slalom_{k}": experiments.slalom_recording(k) for k in (0, 1)}
+    recordings |= {f"moved_cans_{k}": experiments.moved_cans(k) for k in range(len(experiments.LAYOUTS))}
+    recordings["moved_cones"] = experiments.moved_cones()
+    for name, recording in recordings.items():
+        recording.save(options.folder / f"{name}.log.gz")
+    print(f"wrote empty_lab, lab, {', '.join(recordings)} into {options.folder}/")
 
 
 if __name__ == "__main__":

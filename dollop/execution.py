@@ -10,7 +10,7 @@ from math import cos, isfinite, sin
 
 import numpy as np
 
-from dollop.avoidance import ObstacleMap
+from dollop.avoidance import Geodesic, ObstacleMap
 from dollop.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits, clip, wrap
 from dollop.trajectory import distance_to_polyline
 
@@ -223,6 +223,35 @@ def check_places(subgoals, start, kidnap, obstacles):
             raise ValueError(f"{name} must lie in the lab, got ({x:.2f}, {y:.2f}), which is off the map")
         if obstacles.edge(x, y) <= -obstacles.radius:
             raise ValueError(f"{name} must be free, got ({x:.2f}, {y:.2f}), which is in an obstacle or unknown")
+
+
+def free_poses(count, obstacles, goal, seed, room=0.05):
+    """Poses anywhere on a map from which a robot can go to a goal, for starts and kidnappings.
+
+    Parameters
+    ----------
+    count : int
+    obstacles : ObstacleMap
+    goal : (2,) sequence of float
+        m.
+    seed : int or Generator
+    room : float
+        Least distance in m between the robot's edge and any obstacle.
+
+    Returns
+    -------
+    (count, 3) float array
+        x, y in m, theta in rad.
+    """
+    rng, reachable = np.random.default_rng(seed), Geodesic(obstacles, goal)
+    low = np.append(obstacles.origin, -np.pi)
+    high = np.append(low[:2] + obstacles.resolution * np.array(obstacles.distances.shape[::-1]), np.pi)
+    poses = []
+    while len(poses) < count:
+        x, y, theta = rng.uniform(low, high)
+        if obstacles.edge(x, y) > room and isfinite(reachable.distance(x, y)):
+            poses.append((x, y, theta))
+    return np.array(poses)
 
 
 def distances_to_law(run, law):

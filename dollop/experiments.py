@@ -2,9 +2,15 @@
 
 from functools import cache
 
+import numpy as np
+
+from dollop.avoidance import ObstacleMap
+from dollop.execution import free_poses, perform
 from dollop.gridmap import OccupancyGrid
 from dollop.lds import SequencedLDS
+from dollop.matching import match
 from dollop.observation import observe
+from dollop.task import Demonstration, Task, learn
 from dollop.trajectory import laps
 
 SEED = 2004
@@ -50,3 +56,181 @@ def figure_eight_laps():
 def figure_eight_law():
     """Sequenced LDS of the five laps (Sec. III)."""
     return SequencedLDS.fit(figure_eight_laps())
+
+
+@cache
+def figure_eight_task():
+    """The task of the five figure-eights, tied to the two cans (Sec. IV)."""
+    return Task.of(Demonstration(figure_eight_laps(), figure_eights_observed().environment))
+
+
+LAYOUTS = (
+    ((0.1, 0.4), (0.0, -0.7)),
+    ((0.9, -0.4), (-0.7, -0.4)),
+    ((-0.4, -0.6), (0.4, 0.3)),
+)
+"""How far each can is moved in m along x and y, in three ways (Fig. 10)."""
+
+
+def moved_scene(k):
+    """The figure-eight scene with the cans moved in the k-th way."""
+    from dollop.lab import figure_eight_scene, moved
+
+    return moved(figure_eight_scene(), LAYOUTS[k])
+
+
+@cache
+def moved_cans(k):
+    """Recording of the moved cans, nobody walking: the robot looks from where it stood before."""
+    from dollop.lab import watch
+
+    return watch(moved_scene(k), [SEED, k])
+
+
+@cache
+def moved_environment(k):
+    """The moved cans as the robot sees them with its own laser."""
+    return observe(moved_cans(k).log, background_map()).environment
+
+
+@cache
+def adapted_task(k):
+    """The figure-eight task among the moved cans."""
+    return figure_eight_task().adapt(moved_environment(k))
+
+
+def matched_right(k):
+    """Whether the cans were matched as they were moved, first to first and second to second."""
+    before, after = figure_eight_task().environment, moved_environment(k)
+    place = nearest(before.centres, moved_scene(k).positions - LAYOUTS[k])
+    truth = nearest(after.centres, moved_scene(k).positions)[np.argsort(place)]
+    expected = 4 * truth[place.argsort().argsort()][:, None] + np.arange(4)
+    return bool(np.array_equal(match(before, after).indices, expected.ravel()))
+
+
+def nearest(points, places):
+    """For each of places (N, 2) the index of the nearest of points (M, 2)."""
+    return np.linalg.norm(points[None] - np.asarray(places)[:, None], axis=2).argmin(axis=1)
+
+
+def slalom_layout(k):
+    """A row of four cones, each moved somewhere else, and a walk past them: the k-th that has room for one."""
+    from dollop.lab import rearranged, slalom, slalom_scene
+
+    rng = np.random.default_rng([SEED, 11, k])
+    for _ in range(100):
+        try:
+            scene = rearranged(slalom_scene(), rng, reach=0.25, spacing=0.6)
+            return scene, slalom(scene, rng)
+        except ValueError:  # no room to walk among these
+            continue
+    raise RuntimeError("no layout with room for a slalom in 100 draws")
+
+
+@cache
+def slalom_recording(k):
+    """Recording of a slalom, in an environment of its own (Fig. 11)."""
+    from dollop.lab import record
+
+    return record(*slalom_layout(k), [SEED, 11, k])
+
+
+@cache
+def slalom_demonstration(k):
+    """The k-th slalom as the laser saw it."""
+    return Demonstration.of(observe(slalom_recording(k).log, background_map()))
+
+
+@cache
+def slalom_task():
+    """The task learned from two slaloms in different environments, in that of the first (Fig. 12a)."""
+    return learn([slalom_demonstration(0), slalom_demonstration(1)])
+
+
+@cache
+def moved_cones():
+    """Recording of the cones in a third layout, nobody walking."""
+    from dollop.lab import watch
+
+    return watch(slalom_layout(2)[0], [SEED, 12])
+
+
+@cache
+def new_slalom_environment():
+    """The cones of the third layout, as the robot sees them with its own laser (Fig. 12b)."""
+    return observe(moved_cones().log, background_map()).environment
+
+
+@cache
+def new_slalom_task():
+    """The learned task in the third layout."""
+    return slalom_task().adapt(new_slalom_environment())
+
+
+@cache
+def slalom_runs(count=10):
+    """Runs of the learned task in the third layout (Fig. 12b)."""
+    task, scene = new_slalom_task(), slalom_layout(2)[0]
+    starts = starts_near_the_beginning(task, count, np.random.default_rng([SEED, 12]))
+    return [run_in_lab(task, scene, start, seed) for seed, start in enumerate(starts)]
+
+
+def run_in_lab(task, scene, start, seed, **choices):
+    """One run of the simulated Pioneer, which localises itself with its laser, in a scene of the laboratory."""
+    from dollop.lab import LocalisedPioneer, World
+
+    with World(scene) as world:
+        robot = LocalisedPioneer(world, background_map(), start, task.environment, seed)
+        return perform(task, robot, background=background_map(), **choices)
+
+
+def starts_near_the_beginning(task, count, rng):
+    """Poses (count, 3) round the law's start: 0.15 m and 20 degrees off (standard deviations)."""
+    way = task.law.response()[5] - task.law.start
+    poses = np.tile([*task.law.start, np.arctan2(way[1], way[0])], (count, 1))
+    return poses + rng.normal(0, [0.15, 0.15, np.radians(20)], (count, 3))
+
+
+@cache
+def eight_runs(control, count=10):
+    """Runs of the figure-eight in the laboratory, nothing but the law in force (Fig. 7a)."""
+    task, scene = figure_eight_task(), figure_eights().scene
+    starts = starts_near_the_beginning(task, count, np.random.default_rng(SEED))
+    return [run_in_lab(task, scene, start, k, control=control, avoid=False) for k, start in enumerate(starts)]
+
+
+@cache
+def kidnappings(count=5):
+    """Starts (count, 3), times (count,) and poses (count, 3) of kidnappings anywhere in the laboratory."""
+    task, rng = figure_eight_task(), np.random.default_rng([SEED, 7])
+    starts = starts_near_the_beginning(task, count, rng)
+    obstacles = ObstacleMap.of(task.environment, background_map())
+    poses = free_poses(count, obstacles, task.law.subgoals[0], rng)
+    return starts, rng.uniform(5.0, 25.0, count), poses
+
+
+@cache
+def kidnapped_runs(control, avoid, count=5):
+    """Runs of the figure-eight, each kidnapped once (Fig. 7b)."""
+    task, scene = figure_eight_task(), figure_eights().scene
+    return [
+        run_in_lab(task, scene, start, k, control=control, avoid=avoid, kidnap=[(time, pose)])
+        for k, (start, time, pose) in enumerate(zip(*kidnappings(count), strict=True))
+    ]
+
+
+@cache
+def moved_runs(k, count=10):
+    """Runs of the adapted task among the cans moved in the k-th way (Fig. 10b)."""
+    task = adapted_task(k)
+    starts = starts_near_the_beginning(task, count, np.random.default_rng([SEED, 10, k]))
+    return [run_in_lab(task, moved_scene(k), start, seed) for seed, start in enumerate(starts)]
+
+
+def summary(runs):
+    """How many runs there were, how many finished, and how often the robot hit something."""
+    return {
+        "runs": len(runs),
+        "finished": sum(run.finished for run in runs),
+        "collisions": sum(run.collisions for run in runs),
+    }

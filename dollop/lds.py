@@ -142,6 +142,12 @@ class LDS:
         goal = np.mean([walk[-1] for walk in walks], axis=0)
         return cls.from_statistics(sum(others, first), goal)
 
+    def turned(self, angle):
+        """The LDS turned about its subgoal by an angle in rad: A <- R A R^T."""
+        R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        G0, G1 = self.statistics.G0, self.statistics.G1
+        return replace(self, A=R @ self.A @ R.T, statistics=Statistics(R @ G0 @ R.T, R @ G1 @ R.T))
+
     def step(self, x):
         """The next state after x, (..., 2), in m: g + A (x - g)."""
         return self.goal + (np.asarray(x, float) - self.goal) @ self.A.T
@@ -293,7 +299,7 @@ class SequencedLDS:
         back = distance_to_polyline(resample(response, len(samples)), samples)
         return {"mean": float(there.mean()), "max": float(there.max()), "reverse": float(back.mean())}
 
-    def with_subgoals(self, subgoals, start=None):
+    def with_subgoals(self, subgoals, start=None, turned=False):
         """The same task with its subgoals moved; every LDS keeps its A, so the response adapts by itself.
 
         Parameters
@@ -302,6 +308,8 @@ class SequencedLDS:
             m.
         start : (2,) array_like, optional
             Moved as well, m; by default the demonstrations' start stays.
+        turned : bool
+            Beyond the paper: turn every LDS as the line from the subgoal before to its own has turned.
 
         Returns
         -------
@@ -310,8 +318,20 @@ class SequencedLDS:
         goals = np.asarray(subgoals, float)
         if goals.shape != self.subgoals.shape or not np.isfinite(goals).all():
             raise ValueError(f"subgoals must be {len(self.segments)} finite positions, got {subgoals}")
-        segments = tuple(replace(segment, goal=goal) for segment, goal in zip(self.segments, goals, strict=True))
-        return replace(self, segments=segments, start=self.start if start is None else np.asarray(start, float))
+        start = self.start if start is None else np.asarray(start, float)
+        if start.shape != (2,) or not np.isfinite(start).all():
+            raise ValueError(f"start must be two finite numbers, got {start}")
+        segments = [replace(segment, goal=goal) for segment, goal in zip(self.segments, goals, strict=True)]
+        if turned:
+            turns = chord_angles(start, goals) - chord_angles(self.start, self.subgoals)
+            segments = [segment.turned(turn) for segment, turn in zip(segments, turns, strict=True)]
+        return replace(self, segments=tuple(segments), start=start)
+
+
+def chord_angles(start, subgoals):
+    """Direction in rad of the lines from each subgoal to the next, (K,), the first from the start."""
+    chords = np.diff(np.vstack([start, subgoals]), axis=0)
+    return np.arctan2(chords[:, 1], chords[:, 0])
 
 
 def check_search(tolerance, n_segments, sample_period, candidates):

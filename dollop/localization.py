@@ -36,7 +36,7 @@ TRACKING, SEARCHING = 250, 3000
 """Numbers of particles: while they agree (CARMEN's), and while they do not."""
 NARROW = (0.15, 0.15)
 """Standard deviations in m and rad below which particles agree."""
-BELIEVED_AFTER, GIVEN_UP_AFTER = pi, 4 * pi
+BELIEVED_AFTER, GIVEN_UP_AFTER = pi, 2 * pi
 """Angles in rad to turn until a pose that explains every scan is believed, and until the search starts anew."""
 LOST = 0.65
 """Share of its long average below which the fit of a scan is in doubt."""
@@ -90,7 +90,8 @@ class MonteCarloLocalizer:
         free = (background.occupancy < FREE_BELOW) & ~blocked
         if not free.any():
             raise ValueError("the background must have a free cell for the robot to be in, got none")
-        distances = ndimage.distance_transform_edt(~blocked, sampling=background.resolution)
+        surface = blocked & ~ndimage.binary_erosion(blocked, border_value=1)  # no beam ends inside what is solid
+        distances = ndimage.distance_transform_edt(~surface, sampling=background.resolution)
         self.field = LikelihoodField(distances, SIGMA, background.origin, background.resolution)
         self.wide_field = LikelihoodField(distances, WIDE_SIGMA, background.origin, background.resolution)
         self.lattice = lattice(free, background)

@@ -15,7 +15,6 @@ from dollop.foreground import (
 )
 from dollop.tracking import Track, Tracker, identify_user, track_objects, user_track
 
-
 STATIC_EVERY = 5
 """The slow grid looks at every fifth scan: what is static is still there then."""
 

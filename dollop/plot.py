@@ -4,17 +4,20 @@ Colours are from Okabe and Ito's palette, which colour-blind readers can tell ap
 robot are also the paper's.
 """
 
+import io
 from contextlib import contextmanager
+from itertools import pairwise
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Ellipse, Rectangle
 
 USER = "#0072B2"  # blue: the user's track
 OBSTACLE = "#D55E00"  # vermilion: boxes of foreground objects
 ROBOT = "#F0E442"  # yellow: the robot
 LAW = "#009E73"  # green: the control law and its response
 SUBGOAL = "#000000"
+MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper
 RUN = "#CC79A7"  # purple: where the robot went
 OCCLUDED = "#E69F00"  # orange: predictions while the user is occluded
 BACKGROUND = "#8C8C8C"
@@ -114,3 +117,76 @@ def cells(ax, values, grid, **kwargs):
 def legend(ax):
     """A legend in one row under the axes, where it hides nothing."""
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=5, columnspacing=1.0)
+
+
+def track(ax, track, label="track", **kwargs):
+    """A Track's positions, dotted where it was occluded."""
+    path(ax, track.positions, label, **kwargs)
+    ax.plot(*track.positions[track.occluded].T, ".", color=OCCLUDED, markersize=4, zorder=3, label="occluded")
+
+
+def picture(image):
+    """A rendered image (H, W, 3) as a figure of exactly its pixels."""
+    height, width = image.shape[:2]
+    dpi = STYLE["savefig.dpi"]
+    figure = plt.figure(figsize=(width / dpi, height / dpi), layout="none")
+    figure.figimage(image, resize=False)
+    return figure
+
+
+def runs(ax, runs):
+    """Where the robot went: one line per Run; a kidnapping is a dotted leap."""
+    for k, run in enumerate(runs):
+        leaps = np.flatnonzero(np.linalg.norm(np.diff(run.true_poses[:, :2], axis=0), axis=1) > 0.3) + 1
+        for n, part in enumerate(np.split(run.true_poses[:, :2], leaps)):
+            path(ax, part, "robot's runs" if k == n == 0 else None, RUN, linewidth=0.9, alpha=0.8)
+        for leap in leaps:
+            path(ax, run.true_poses[leap - 1 : leap + 1], "kidnapped" if k == 0 else None, "black", linestyle=":")
+            ax.plot(*run.true_poses[leap, :2], "o", color="black", markersize=4)
+
+
+def png(figure):
+    """A figure as PNG bytes, for an `ipywidgets.Image`; the figure is closed."""
+    with io.BytesIO() as stream:
+        figure.savefig(stream, format="png", dpi=figure.dpi)
+        plt.close(figure)
+        return stream.getvalue()
+
+
+def cdhmm(ax, model, sd=2.0):
+    """A SubgoalHMM in the plane: states, steps between them, and the most-likely path in red.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    model : SubgoalHMM
+        Its states as dots at their means, with their numbers and covariances; the start and the end are not drawn.
+    sd : float
+        How many standard deviations each state's ellipse reaches.
+    """
+    path_steps = set(pairwise(model.most_likely_path().tolist()))
+    ax.plot([], [], color=BACKGROUND, label="steps, wide where probable")
+    ax.plot([], [], color=MOST_LIKELY, label="most-likely path")
+    for u, v in np.argwhere(model.transitions > 0).tolist():
+        colour = MOST_LIKELY if (u, v) in path_steps else BACKGROUND
+        step(ax, model.means[u], model.means[v], 0.5 + 2.0 * model.transitions[u, v], colour)
+    for state, (mean, covariance) in enumerate(zip(model.means, model.covariances, strict=True)):
+        label = f"states, ellipses of {sd:g} sd" if state == 0 else None
+        ellipse(ax, mean, covariance, sd, label=label)
+        ax.annotate(str(state), mean, xytext=(6, 6), textcoords="offset points", zorder=8)
+    ax.plot(*model.means.T, ".", color=SUBGOAL, markersize=6, zorder=7)
+
+
+def step(ax, tail, head, width, colour):
+    """An arrow from one place to another, `width` in points."""
+    drawn = {"arrowstyle": "-|>", "linewidth": width, "color": colour, "shrinkA": 0, "shrinkB": 2}
+    ax.annotate("", head, tail, arrowprops=drawn, zorder=5)
+
+
+def ellipse(ax, mean, covariance, sd=2.0, colour=SUBGOAL, label=None):
+    """Where a normal distribution of this mean (2,) and covariance (2, 2) reaches `sd` standard deviations."""
+    variances, axes = np.linalg.eigh(covariance)
+    width, height = 2 * sd * np.sqrt(variances)
+    angle = np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))
+    look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15, "zorder": 3}
+    ax.add_patch(Ellipse(mean, width, height, angle=angle, label=label, **look))

@@ -16,11 +16,17 @@ ANGLES = np.deg2rad(np.arange(-90.0, 91.0))
 
 
 def room_map():
-    """Occupancy of walls and furniture, all else free."""
-    x, y = (np.arange(-0.1, size + 0.1 - 1e-9, SIDE) + SIDE / 2 for size in (WIDTH, DEPTH))
-    x, y = np.meshgrid(x, y)
-    blocked = sum((x > a) & (x < c) & (y > b) & (y < d) for a, b, c, d in (*FURNITURE, *WALLS)) > 0
-    return OccupancyGrid(np.where(blocked, 1.0, 0.0), (-0.1, -0.1), SIDE)
+    """Walls and furniture; as in a recorded map, surfaces run through the middle of cells."""
+    return drawn_map([*FURNITURE, *WALLS], WIDTH, DEPTH)
+
+
+def drawn_map(boxes, width, depth, border=0.1):
+    """A map of boxes (N, 4) in m, the cells' middles at multiples of their side."""
+    x, y = np.meshgrid(*(np.arange(-border, size + border + 1e-9, SIDE) for size in (width, depth)))
+    blocked = np.zeros(x.shape, dtype=bool)
+    for left, low, right, high in boxes:
+        blocked |= (x > left - 1e-6) & (x < right + 1e-6) & (y > low - 1e-6) & (y < high + 1e-6)
+    return OccupancyGrid(blocked.astype(float), (-border - SIDE / 2, -border - SIDE / 2), SIDE)
 
 
 def scan(pose, boxes, rng=None, noise=0.005):
@@ -45,14 +51,3 @@ def figure_eight(samples=240):
 def figure_eight_task():
     """The figure-eight as a task: its law, and the two cans as its environment."""
     return SimpleNamespace(law=SequencedLDS.fit(figure_eight()), environment=Environment(CANS))
-
-
-def free_poses(count, obstacles, reachable, seed):
-    """Poses (count, 3) anywhere in the room where the robot has 5 cm of room and a way to go."""
-    rng = np.random.default_rng(seed)
-    poses = []
-    while len(poses) < count:
-        x, y, theta = rng.uniform([0, 0, -np.pi], [WIDTH, DEPTH, np.pi])
-        if obstacles.edge(x, y) > 0.05 and np.isfinite(reachable.distance(x, y)):
-            poses.append((x, y, theta))
-    return np.array(poses)

@@ -16,9 +16,11 @@ NEEDS_PYBULLET = {
     "World": "world",
     "SickLMS200": "sick",
     "Pioneer": "pioneer",
+    "LocalisedPioneer": "robot",
     "record": "simulate",
     "record_figure_eights": "simulate",
     "record_background": "simulate",
+    "watch": "simulate",
     "render_lab": "render",
     "render_robot": "render",
 }

@@ -26,7 +26,7 @@ class Recording:
     log : LaserLog
         T scans from the standing robot.
     truth : pandas.DataFrame
-        The walker at each scan: t in s, x and y in m, heading in rad.
+        The walker at each scan, no rows if nobody walks: t in s, x and y in m, heading in rad.
     scene : Scene
         What stood where.
     """
@@ -70,9 +70,9 @@ def load_truth(path, n_scans):
         truth = pd.read_csv(path, dtype=float)
     except ValueError as error:
         raise FormatError(f"not a table of numbers: {error}", path) from error
-    if list(truth.columns) != TRUTH_COLUMNS or len(truth) != n_scans:
+    if list(truth.columns) != TRUTH_COLUMNS or len(truth) not in (0, n_scans):
         raise FormatError(
-            f"columns must be {TRUTH_COLUMNS} and rows {n_scans}, one for each scan, "
+            f"columns must be {TRUTH_COLUMNS} and rows {n_scans}, one for each scan, or none if nobody walks, "
             f"got {list(truth.columns)} and {len(truth)}",
             path,
         )

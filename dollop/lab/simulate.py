@@ -59,6 +59,31 @@ def record(scene, walk, seed, sick=None, legs=False):
     return Recording(log, pd.DataFrame(rows, columns=TRUTH_COLUMNS), scene)
 
 
+def watch(scene, seed, duration=6.0, sick=None):
+    """What the standing robot's laser sees of a scene in which nobody walks.
+
+    Parameters
+    ----------
+    scene : Scene
+    seed : int or numpy.random.Generator
+        For the laser's noise.
+    duration : float
+        s.
+    sick : SickLMS200, optional
+
+    Returns
+    -------
+    Recording
+        Its truth has no rows.
+    """
+    sick, rng = sick or SickLMS200(), np.random.default_rng(seed)
+    t, pose = np.arange(0.0, duration, 1 / sick.rate), laser_pose(scene.robot)
+    with World(scene) as world:
+        ranges = np.array([sick.scan(world, pose, rng) for _ in t])
+    log = LaserLog(t, ranges, sick.angles, np.tile(pose, (len(t), 1)), sick.max_range)
+    return Recording(log, pd.DataFrame(columns=TRUTH_COLUMNS), scene)
+
+
 def record_figure_eights(seed, laps=5, scene=None, sick=None, legs=False, **gait):
     """Five figure-eights round two trash cans, seen by the laser (Fig. 6a): a `record` of `person.figure_eight`.
 

@@ -1,0 +1,259 @@
+"""Performing: the robots' limits, runs that finish or say why not, kidnappings, and bad input."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from rooms import CANS, FURNITURE, figure_eight_task, room_map
+
+from dollop.avoidance import INFLUENCE, ObstacleMap
+from dollop.control import PIONEER_LIMITS, Limits
+from dollop.environment import Environment
+from dollop.execution import Unicycle, distances_to_law, free_poses, perform, return_times
+from dollop.trajectory import distance_to_polyline
+
+START = (4.5, 3.6, -0.7)
+
+
+@pytest.fixture(scope="module")
+def background():
+    return room_map()
+
+
+@pytest.fixture(scope="module")
+def task():
+    return figure_eight_task()
+
+
+@pytest.fixture(scope="module")
+def kidnappings(task, background):
+    """Fifty, anywhere free at any time."""
+    obstacles = ObstacleMap.of(task.environment, background)
+    poses = free_poses(50, obstacles, task.law.subgoals[0], seed=1)
+    return list(zip(np.random.default_rng(2).uniform(1, 33, 50), poses, strict=True))
+
+
+class Blind(Unicycle):
+    """Never knows where it is, and remembers its commands."""
+
+    localised, commands = False, ()
+
+    def drive(self, speed, turn):
+        self.commands = (*self.commands, (speed, turn))
+        super().drive(speed, turn)
+
+
+class Stuck(Unicycle):
+    """Has its wheels in the air."""
+
+    def drive(self, speed, turn):
+        pass
+
+
+class Dreamer(Unicycle):
+    """Loses its pose after two seconds."""
+
+    periods = 0
+
+    def drive(self, speed, turn):
+        super().drive(speed, turn)
+        self.periods += 1
+        if self.periods == 20:
+            self.pose = (np.nan, *self.pose[1:])
+
+
+def test_unicycle_keeps_its_limits():
+    """Whatever is commanded, speeds and accelerations stay within the limits."""
+    robot, rng = Unicycle((0.0, 0.0, 0.0)), np.random.default_rng(0)
+    before = robot.speed, robot.turn
+    for _ in range(300):
+        robot.drive(*rng.normal(0, 3, 2))
+        assert abs(robot.speed) <= 0.5 and abs(robot.turn) <= 0.8
+        assert abs(robot.speed - before[0]) <= 0.05 + 1e-12 and abs(robot.turn - before[1]) <= 0.157 + 1e-12
+        before = robot.speed, robot.turn
+
+
+def test_unicycle_drives_circles():
+    """At constant v and omega the robot comes back after 2 pi / omega on a circle of radius v / omega."""
+    robot = Unicycle((0.0, 0.0, 0.0), Limits(1.0, 1.0, 1e3, 1e3), period=2 * np.pi / 100)
+    ys = []
+    for _ in range(100):
+        robot.drive(0.5, 1.0)
+        ys.append(robot.pose[1])
+    assert robot.pose == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert max(ys) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_run_has_the_shapes_it_says(task, background):
+    """Every record has one row per control period, and the run is over when it is finished."""
+    run = perform(task, Unicycle(START), background=background)
+    n = len(run.t)
+    assert run.finished and run.reason == "" and run.collisions == 0
+    assert run.poses.shape == run.true_poses.shape == (n, 3)
+    assert run.active.shape == run.localised.shape == run.clearance.shape == (n,)
+    assert np.diff(run.t) == pytest.approx(np.full(n - 1, 0.1))
+    with pytest.raises(AttributeError):
+        run.finished = False
+
+
+def test_runs_are_repeatable(task, background):
+    """The same robot performs the same run."""
+    first, second = (perform(task, Unicycle(START), background=background) for _ in range(2))
+    assert (first.poses == second.poses).all()
+
+
+@pytest.mark.parametrize(("control", "bound"), [("plain", 0.080), ("pursuit", 0.040)])
+def test_distance_to_the_law(task, background, control, bound):
+    """Within the Pioneer's limits the mean distance to the response is at most 80 mm, 40 mm when it is pursued."""
+    starts = np.array(START) + np.random.default_rng(0).normal(0, 0.15, (10, 3))
+    runs = [perform(task, Unicycle(start), control, background=background) for start in starts]
+    assert all(run.finished and run.collisions == 0 for run in runs)
+    assert np.mean([distances_to_law(run, task.law).mean() for run in runs]) <= bound
+
+
+@pytest.mark.parametrize("control", ["plain", "pursuit"])
+def test_avoidance_leaves_a_free_run_as_it_is(task, control):
+    """Where nothing is near, the run with avoidance is the run without."""
+    runs = [perform(task, Unicycle(START), control, avoid) for avoid in (False, True)]
+    assert runs[0].clearance.min() > INFLUENCE
+    assert (runs[0].poses == runs[1].poses).all()
+
+
+@pytest.mark.parametrize("control", ["plain", "pursuit"])
+def test_kidnapped_anywhere_it_finishes_without_collision(task, background, kidnappings, control):
+    """Fifty kidnappings anywhere free at any time: all finish, and with avoidance none touches anything."""
+    for kidnapping in kidnappings:
+        run = perform(task, Unicycle(START), control, background=background, kidnap=[kidnapping])
+        assert run.finished, (kidnapping, run.reason)
+        assert run.collisions == 0 and run.clearance.min() > 0
+
+
+def test_without_avoidance_it_finishes_and_some_runs_hit(task, background, kidnappings):
+    """The paper's law gets there as well, through what stands in its way: no hit was a coincidence."""
+    runs = [perform(task, Unicycle(START), "plain", False, background, [k]) for k in kidnappings]
+    assert all(run.finished for run in runs)
+    assert 0 < sum(run.collisions > 0 for run in runs) < 50
+
+
+def test_collisions_are_counted_once_each(task):
+    """Crossing a box on the way counts as one collision, however long it lasts."""
+    law = task.law
+    box = np.concatenate([law.subgoals[0] - 0.3, law.subgoals[0] - 0.1])
+    run = perform(SimpleNamespace(law=law, environment=Environment([box])), Unicycle(START), "plain", avoid=False)
+    assert run.finished and run.collisions == 1 and run.clearance.min() < 0
+
+
+def test_it_goes_round_what_stands_on_its_way(task):
+    """A box on the middle of a segment is gone round, and the subgoals stay where the segments hand over."""
+    middle = np.array([5.8, 2.8])
+    assert distance_to_polyline(middle[None], task.law.response()) < 0.1
+    environment = Environment(np.vstack([CANS, [*(middle - 0.15), *(middle + 0.15)]]))
+    for control in ("plain", "pursuit"):
+        run = perform(SimpleNamespace(law=task.law, environment=environment), Unicycle(START), control)
+        assert run.finished and run.collisions == 0
+        handed_over = run.poses[1:][np.diff(run.active) > 0, :2]
+        assert np.hypot(*(handed_over - task.law.subgoals[:-1]).T).max() < 0.4
+
+
+def test_it_comes_out_of_a_trap(task, background):
+    """Kidnapped into a niche between two boxes against the wall, it takes the way that leads out."""
+    niche = np.array([[2.0, 6.3, 4.0, 7.0], [4.9, 5.2, 5.1, 7.0], [3.2, 5.2, 4.1, 5.4]])
+    there = SimpleNamespace(law=task.law, environment=Environment(np.vstack([CANS, niche])))
+    for control in ("plain", "pursuit"):
+        run = perform(there, Unicycle(START), control, background=background, kidnap=[(5.0, (4.5, 6.4, 1.0))])
+        assert run.finished and run.collisions == 0, (control, run.reason)
+
+
+def test_a_stuck_robot_gives_up(task, background):
+    """A robot that does not move gives up and says at which subgoal."""
+    for control in ("plain", "pursuit"):
+        run = perform(task, Stuck(START), control, background=background)
+        assert not run.finished and "no progress towards subgoal 0" in run.reason
+        assert run.t[-1] < 120
+
+
+def test_a_walled_subgoal_is_given_up(task, background):
+    """A subgoal behind a wall from side to side cannot be reached: the robot stops with a reason, and hits nothing."""
+    wall = Environment([[5.4, 0.0, 5.6, 7.0]])
+    for control in ("plain", "pursuit"):
+        run = perform(SimpleNamespace(law=task.law, environment=wall), Unicycle(START), control, background=background)
+        assert not run.finished and "no progress" in run.reason and run.collisions == 0
+
+
+def test_time_is_limited(task):
+    """What takes longer than the time-out is not finished, and says so."""
+    run = perform(task, Unicycle(START), timeout=5.0)
+    assert not run.finished and run.reason == "not finished within 5 s"
+    assert run.t[-1] == pytest.approx(5.0)
+
+
+def test_a_robot_that_never_knows_where_it_is_only_turns(task):
+    """Until it is localised the robot turns on the spot, and gives up after the time it is given."""
+    robot = Blind(START)
+    run = perform(task, robot, localise_within=10.0)
+    assert not run.finished and "has not known where it is" in run.reason
+    assert all(speed == 0.0 for speed, _ in robot.commands)
+    assert run.true_poses[:, :2] == pytest.approx(np.tile(START[:2], (len(run.t), 1)))
+    assert not run.localised.any()
+
+
+def test_a_pose_that_is_lost_ends_the_run(task):
+    """A pose that is not a number ends the run with a reason, and the robot is told to stop."""
+    run = perform(task, Dreamer(START))
+    assert not run.finished and "pose must be finite" in run.reason
+    assert run.t[-1] == pytest.approx(2.0)
+
+
+def test_return_times(task):
+    """The time until the robot is back on its response: none if it is put on it, some if beside it."""
+    response = task.law.response(START[:2])
+    on, beside = response[len(response) // 2], (4.5, 5.8)
+    runs = [perform(task, Unicycle(START), kidnap=[(8.0, (*place, 0.0))]) for place in (on, beside)]
+    assert return_times(runs[0], task.law) == pytest.approx([0.0], abs=1e-9)
+    assert 0.5 < return_times(runs[1], task.law)[0] < 20
+    assert runs[0].kidnapped == pytest.approx([8.0])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"control": "fancy"}, "control must be one of .*'fancy'"),
+        ({"timeout": 0.0}, "timeout and localise_within must be positive, got 0.0"),
+        ({"kidnap": [(3.0, (3.0, 6.6, 0.0))]}, "kidnapping at 3 s must be free"),
+        ({"kidnap": [(3.0, (np.nan, 2.0, 0.0))]}, "kidnapping at 3 s must be finite"),
+        ({"kidnap": [(3.0, (20.0, 2.0, 0.0))]}, "kidnapping at 3 s must lie in the lab"),
+        ({"robot": Unicycle((7.5, 0.3, 0.0))}, "the start must be free"),
+        ({"robot": Unicycle((4.0, np.nan, 0.0))}, "the start must be finite"),
+        ({"robot": Unicycle((4.0, -5.0, 0.0))}, "the start must lie in the lab"),
+    ],
+)
+def test_bad_input(task, background, change, message):
+    """What cannot be performed is refused, naming the value and the rule."""
+    arguments = {"robot": Unicycle(START), "background": background} | change
+    with pytest.raises(ValueError, match=message):
+        perform(task, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [
+        ((7.5, 0.3), "subgoal 1 must be free"),
+        ((2.5, 3.6), "subgoal 1 must be free"),
+        ((12.0, 3.0), "subgoal 1 must lie"),
+    ],
+)
+def test_subgoals_must_be_free(task, background, place, message):
+    """A subgoal outside the lab, in the furniture or in an object is refused."""
+    subgoals = task.law.subgoals.copy()
+    subgoals[1] = place
+    moved = SimpleNamespace(law=task.law.with_subgoals(subgoals), environment=task.environment)
+    with pytest.raises(ValueError, match=message):
+        perform(moved, Unicycle(START), background=background)
+
+
+def test_inputs_are_not_changed(task, background):
+    """Performing leaves law, map and schedule as they were."""
+    subgoals, occupancy, kidnap = task.law.subgoals.copy(), background.occupancy.copy(), [(3.0, (2.0, 2.0, 0.0))]
+    perform(task, Unicycle(START), background=background, kidnap=kidnap)
+    assert (task.law.subgoals == subgoals).all() and (background.occupancy == occupancy).all()
+    assert kidnap == [(3.0, (2.0, 2.0, 0.0))] and PIONEER_LIMITS == (0.5, 0.8, 0.5, 1.57) and len(FURNITURE) == 4

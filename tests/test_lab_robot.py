@@ -1,0 +1,87 @@
+"""Agent Orange in the laboratory: it knows where it is from odometry and laser alone, performs, and is kidnapped."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pybullet", reason="the laboratory needs PyBullet")
+
+from rooms import figure_eight
+
+from dollop.environment import Environment
+from dollop.execution import perform
+from dollop.gridmap import OccupancyGrid
+from dollop.lab.robot import LocalisedPioneer
+from dollop.lab.scenes import BACKGROUND, BEAM_HEIGHT, ROOM, figure_eight_scene
+from dollop.lab.world import World
+from dollop.lds import SequencedLDS
+
+START = (4.5, 3.6, -0.7)
+
+
+@pytest.fixture(scope="module")
+def background():
+    """The laboratory's map as drawn, at the height of the laser."""
+    x, y = (np.arange(-0.1, size + 0.1 - 1e-9, 0.05) + 0.025 for size in ROOM)
+    x, y = np.meshgrid(x, y)
+    parts = [p.bounds for p in BACKGROUND if abs(p.centre[2] - BEAM_HEIGHT) < p.size[2] / 2]
+    blocked = sum((x > a - 0.02) & (x < c + 0.02) & (y > b - 0.02) & (y < d + 0.02) for a, b, c, d in parts) > 0
+    return OccupancyGrid(blocked.astype(float), (-0.1, -0.1), 0.05)
+
+
+@pytest.fixture(scope="module")
+def task():
+    return SimpleNamespace(law=SequencedLDS.fit(figure_eight()), environment=Environment(figure_eight_scene().boxes))
+
+
+def run_in_lab(task, background, **keywords):
+    with World(figure_eight_scene()) as world:
+        robot = LocalisedPioneer(world, background, START, task.environment, seed=0)
+        return perform(task, robot, background=background, **keywords)
+
+
+def pose_errors(run):
+    """Distance in m and angle in degrees between estimate and truth, where the robot believed the estimate."""
+    difference = (run.poses - run.true_poses)[run.localised]
+    return np.hypot(*difference[:, :2].T), np.degrees(np.abs(np.angle(np.exp(1j * difference[:, 2]))))
+
+
+def test_it_performs_on_its_estimated_pose(task, background):
+    """A lap of the figure-eight: finished without contact, localised within 5 cm and 3 degrees on average."""
+    run = run_in_lab(task, background)
+    assert run.finished and run.collisions == 0, run.reason
+    place, turn = pose_errors(run)
+    assert place.mean() < 0.05 and turn.mean() < 3
+    assert (run.poses != run.true_poses).any()
+
+
+def test_kidnapped_it_stops_finds_itself_and_goes_on(task, background):
+    """Carried across the room, it stays where it was put until it knows where that is, and then finishes."""
+    run = run_in_lab(task, background, kidnap=[(6.0, (1.0, 3.5, 2.0))])
+    assert run.finished and run.collisions == 0, run.reason
+    lost = ~run.localised
+    assert 2.0 < lost.sum() * 0.1 < 20.0
+    assert np.ptp(run.true_poses[lost, :2], axis=0).max() < 0.15
+    assert np.median(pose_errors(run)[0]) < 0.05
+
+
+def test_a_start_it_is_not_told(task, background):
+    """Not told where it starts, it turns until it knows."""
+    with World(figure_eight_scene()) as world:
+        robot = LocalisedPioneer(world, background, START, task.environment, seed=1, knows_start=False)
+        assert np.isfinite(robot.pose).all() and not robot.localised
+        for _ in range(100):
+            robot.drive(0.0, 0.5)
+        assert robot.localised
+        assert np.hypot(*np.subtract(robot.pose, robot.true_pose)[:2]) < 0.05
+
+
+def test_it_feels_what_it_touches(background):
+    """Driven against a can, it touches; standing free, it does not."""
+    with World(figure_eight_scene()) as world:
+        robot = LocalisedPioneer(world, background, (3.3, 3.6, np.pi), seed=0)
+        assert not robot.touching
+        for _ in range(30):
+            robot.drive(0.3, 0.0)
+        assert robot.touching

@@ -1,0 +1,228 @@
+"""Monte Carlo localisation: it follows, it notices a kidnapping, it finds itself, and it believes nothing too early."""
+
+import numpy as np
+import pytest
+from rooms import ANGLES, CANS, FURNITURE, WALLS, drawn_map, room_map, scan
+
+from dollop.environment import Environment
+from dollop.gridmap import OccupancyGrid
+from dollop.localization import (
+    BELIEVED_AFTER,
+    FLOOR,
+    SEARCHING,
+    SIGMA,
+    TRACKING,
+    LikelihoodField,
+    MonteCarloLocalizer,
+    mean_pose,
+    motion_between,
+    moved_particles,
+    softmax,
+)
+
+ROOM = np.vstack([WALLS, FURNITURE])
+START = np.array([4.5, 3.6, -0.7])
+
+
+@pytest.fixture(scope="module")
+def background():
+    return room_map()
+
+
+def compose(pose, motion):
+    """The pose after a motion, as `motion_between` has it."""
+    ahead, left, turn = motion
+    middle = pose[2] + turn / 2
+    dx, dy = ahead * np.cos(middle) - left * np.sin(middle), ahead * np.sin(middle) + left * np.cos(middle)
+    return np.array([pose[0] + dx, pose[1] + dy, pose[2] + turn])
+
+
+def follow(localizer, pose, motions, rng, boxes=ROOM):
+    """Drive by `motions` (N, 3) with an odometry 3 % wrong: true poses (N, 3), estimates, and whether believed."""
+    records = []
+    for motion in motions:
+        pose = compose(pose, motion)
+        localizer.update(motion * [1.03, 1.0, 0.97], scan(pose, boxes, rng))
+        records.append((pose, localizer.pose, localizer.localised))
+    return [np.array(column) for column in zip(*records, strict=True)]
+
+
+def errors(truth, estimate):
+    """Distance in m and angle in rad between poses (N, 3)."""
+    turn = np.angle(np.exp(1j * (truth - estimate)[:, 2]))
+    return np.linalg.norm((truth - estimate)[:, :2], axis=1), np.abs(turn)
+
+
+TURNING = np.tile([0.0, 0.0, 0.05], (80, 1))
+DRIVING = np.column_stack([np.full(200, 0.05), np.zeros(200), 0.04 * np.sin(np.arange(200) / 15)])
+
+
+@pytest.mark.parametrize("boxes", [ROOM, np.vstack([ROOM, CANS])], ids=["as mapped", "with two cans"])
+def test_it_follows(background, boxes):
+    """Driving with wrong odometry the mean error stays within 5 cm and 3 degrees, also with things not on the map."""
+    start = np.array([1.5, 2.2, 0.0])
+    localizer = MonteCarloLocalizer(background, ANGLES, pose=start, seed=0)
+    truth, estimate, believed = follow(localizer, start, DRIVING[:130], np.random.default_rng(1), boxes)
+    place, turn = errors(truth, estimate)
+    assert place.mean() < 0.05 and np.degrees(turn.mean()) < 3
+    assert believed.mean() > 0.97
+    assert len(localizer.particles) == TRACKING
+
+
+def test_it_does_not_need_luck(background):
+    """Odometry alone drifts farther than the bound that localisation keeps."""
+    start, drifted = np.array([1.5, 2.2, 0.0]), np.array([1.5, 2.2, 0.0])
+    truth = start
+    for motion in DRIVING[:130]:
+        truth, drifted = compose(truth, motion), compose(drifted, motion * [1.03, 1.0, 0.97])
+    assert np.hypot(*(truth - drifted)[:2]) > 0.10
+
+
+def test_it_finds_itself_anywhere(background):
+    """Set down at an unknown pose and turning, it believes the right pose, never a wrong one: 10 of 10."""
+    rng = np.random.default_rng(3)
+    for seed in range(10):
+        pose = np.array([*rng.uniform([1.0, 1.2], [8.0, 3.0]), rng.uniform(-np.pi, np.pi)])
+        localizer = MonteCarloLocalizer(background, ANGLES, seed=seed)
+        truth, estimate, believed = follow(localizer, pose, np.tile(TURNING, (2, 1)), rng, np.vstack([ROOM, CANS]))
+        place, turn = errors(truth, estimate)
+        assert believed[-1], pose
+        assert place[believed].max() < 0.15 and np.degrees(turn[believed].max()) < 5
+
+
+def test_it_notices_a_kidnapping_and_finds_itself(background):
+    """Carried off, it doubts at the next scans, and after turning it believes the new pose: 10 of 10."""
+    rng = np.random.default_rng(4)
+    for seed in range(10):
+        localizer = MonteCarloLocalizer(background, ANGLES, pose=START, seed=seed)
+        _, _, believed = follow(localizer, START, DRIVING[:15], rng)
+        assert believed.all()
+        pose = np.array([*rng.uniform([1.0, 1.2], [8.0, 3.0]), rng.uniform(-np.pi, np.pi)])
+        truth, estimate, believed = follow(localizer, pose, TURNING, rng)
+        place, _ = errors(truth, estimate)
+        assert not believed[2] and believed[-1]
+        assert place[-1] < 0.10
+
+
+def test_a_pose_is_not_believed_before_half_a_turn(background):
+    """However well the first scan fits, a searched pose is believed only after half a turn; standing, never."""
+    rng = np.random.default_rng(5)
+    localizer = MonteCarloLocalizer(background, ANGLES, seed=0)
+    standing = follow(localizer, START, np.zeros((30, 3)), rng)[2]
+    assert not standing.any()
+    believed = follow(localizer, START, TURNING, rng)[2]
+    assert believed.argmax() * 0.05 * 0.97 >= BELIEVED_AFTER - 0.1
+
+
+def test_alike_from_two_sides(background):
+    """In a bare room two poses are alike in every scan, and nothing can tell which; a third is never believed."""
+    walls = np.array([[-0.1, 0, 0, 6], [8, 0, 8.1, 6], [-0.1, -0.1, 8.1, 0], [-0.1, 6, 8.1, 6.1]])
+    pose, rng = np.array([2.0, 2.0, 0.3]), np.random.default_rng(6)
+    localizer = MonteCarloLocalizer(drawn_map(walls, 8.0, 6.0), ANGLES, seed=0)
+    truth, estimate, believed = follow(localizer, pose, np.tile(TURNING, (5, 1)), rng, walls)
+    other = np.array([8.0, 6.0, np.pi]) + [-1, -1, 1] * truth
+    nearest = np.minimum(errors(truth, estimate)[0], errors(other, estimate)[0])
+    assert (nearest[believed] < 0.10).all()
+
+
+def test_a_strange_room_is_never_believed(background):
+    """Where the map explains nothing, no pose is believed, however long it turns."""
+    hall = np.array([[-8.1, -9.0, -8.0, 9.0], [8.0, -9.0, 8.1, 9.0], [-9.0, -9.1, 9.0, -9.0], [-9.0, 9.0, 9.0, 9.1]])
+    localizer = MonteCarloLocalizer(background, ANGLES, seed=0)
+    turning, rng = np.tile(TURNING, (4, 1)), np.random.default_rng(0)
+    believed = follow(localizer, np.array([1.0, 2.0, 0.0]), turning, rng, hall)[2]
+    assert not believed.any()
+
+
+def test_known_boxes_fit_better(background):
+    """The boxes of the environment explain the beams that end on them."""
+    ranges = scan(START, np.vstack([ROOM, CANS]))
+    fits = []
+    for environment in (None, Environment(CANS)):
+        localizer = MonteCarloLocalizer(background, ANGLES, environment, START, seed=0)
+        localizer.update((0.0, 0.0, 0.0), ranges)
+        fits.append(localizer.fit)
+    assert fits[1] > fits[0] + 0.02
+
+
+def test_same_seed_same_pose(background):
+    """The same seed and the same scans give the same poses."""
+    runs = [
+        follow(MonteCarloLocalizer(background, ANGLES, seed=7), START, TURNING[:20], np.random.default_rng(8))[1]
+        for _ in range(2)
+    ]
+    assert (runs[0] == runs[1]).all()
+
+
+def test_field_against_the_formula(background):
+    """Looked up or computed from its definition, the likelihood of a scan is the same."""
+    field = LikelihoodField(background.distance_field(), SIGMA, background.origin, background.resolution)
+    rng = np.random.default_rng(0)
+    poses = np.column_stack([rng.uniform([1, 1], [8, 6], (20, 2)), rng.uniform(-3, 3, 20)])
+    ends = rng.uniform(-1, 1, (9, 2))
+    for pose, value in zip(poses, field.log_likelihoods(poses, ends), strict=True):
+        turn = np.array([[np.cos(pose[2]), -np.sin(pose[2])], [np.sin(pose[2]), np.cos(pose[2])]])
+        distances = background.distance_at(pose[:2] + ends @ turn.T)
+        q = np.where(np.isnan(distances), 0.0, np.exp(-0.5 * (distances / SIGMA) ** 2))
+        assert value == pytest.approx(np.log(FLOOR + (1 - FLOOR) * q).sum(), rel=1e-4)
+
+
+def test_beams_beyond_the_map_explain_nothing(background):
+    """A beam that ends off the map, however far, counts the floor and breaks nothing."""
+    field = LikelihoodField(background.distance_field(), SIGMA, background.origin, background.resolution)
+    ends = np.array([[1e6, 0.0], [0.0, -50.0]])
+    assert field.log_likelihoods(START[None], ends) == pytest.approx([2 * np.log(FLOOR)])
+
+
+def test_lattice_agrees_with_particles(background):
+    """Moving beams by whole cells scores a place as the exact way does, to what a cell makes of it."""
+    field = LikelihoodField(background.distance_field(), 0.2, background.origin, background.resolution)
+    places = np.random.default_rng(0).uniform([1, 1], [8, 6], (200, 2))
+    ends = np.random.default_rng(1).uniform(-3, 3, (30, 2))
+    exact = field.log_likelihoods(np.column_stack([places, np.full(200, 0.7)]), ends)
+    assert np.corrcoef(exact, field.lattice_log_likelihoods(places, 0.7, ends))[0, 1] > 0.98
+
+
+def test_motion_between_inverts_compose():
+    """The motion between two poses leads from the one to the other."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        before, motion = rng.uniform(-3, 3, 3), rng.uniform(-1, 1, 3)
+        assert motion_between(before, compose(before, motion)) == pytest.approx(motion)
+
+
+def test_moved_particles_are_unbiased():
+    """Their mean is where the odometry says, and they spread with the way."""
+    still = np.zeros((4000, 3))
+    short, long = (moved_particles(still, (way, 0.0, 0.0), np.random.default_rng(0)) for way in (0.1, 1.0))
+    assert long.mean(axis=0) == pytest.approx([1.0, 0.0, 0.0], abs=0.01)
+    assert (long.std(axis=0) > short.std(axis=0)).all()
+
+
+def test_mean_pose_of_headings_round_pi():
+    """Headings just above and below pi have their mean at pi, not at zero, and a small spread."""
+    particles = np.array([[1.0, 2.0, np.pi - 0.1], [1.0, 2.0, -np.pi + 0.1]])
+    pose, spread = mean_pose(particles, np.array([0.5, 0.5]))
+    assert abs(pose[2]) == pytest.approx(np.pi)
+    assert spread == pytest.approx([0.0, 0.1], abs=1e-3)
+
+
+def test_softmax_of_large_scores():
+    """Scores that would overflow give shares that sum to one."""
+    assert softmax(np.array([1e4, 1e4, -1e4])) == pytest.approx([0.5, 0.5, 0.0])
+
+
+def test_scan_without_returns(background):
+    """A scan in which nothing came back is survived, and believed to explain nothing."""
+    localizer = MonteCarloLocalizer(background, ANGLES, seed=0)
+    localizer.update((0.0, 0.0, 0.1), np.full(len(ANGLES), np.inf))
+    assert len(localizer.particles) == SEARCHING and localizer.fit == 0.0
+    assert np.isfinite(localizer.pose).all()
+
+
+def test_bad_input(background):
+    """A start that is not finite and a map without a free cell are refused."""
+    with pytest.raises(ValueError, match="pose must be finite"):
+        MonteCarloLocalizer(background, ANGLES, pose=(np.nan, 0.0, 0.0))
+    with pytest.raises(ValueError, match="free cell"):
+        MonteCarloLocalizer(OccupancyGrid(np.ones((9, 9)), (0.0, 0.0), 0.05), ANGLES)

@@ -1,0 +1,198 @@
+"""Sec. IV-B and V: tasks adapt to moved objects, are learned from several demonstrations, saved and loaded."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dollop import Demonstration, Environment, FormatError, Task, learn
+from dollop.task import anchors
+
+CANS = np.array([[2.3, 3.4, 2.7, 3.8], [6.3, 3.4, 6.7, 3.8]])
+THREE = np.vstack([CANS, [4.0, 1.0, 4.4, 1.4]])
+
+
+def eight(shift=(0.0, 0.0), size=1.0, noise=0.0, seed=0):
+    """A figure-eight round the cans, 160 points."""
+    angle = np.linspace(0, 2 * np.pi, 160)
+    path = np.stack([3.2 * np.sin(angle), 1.3 * np.sin(2 * angle)], axis=1)
+    wave = np.sin(np.arange(1, 5)[:, None] * angle)
+    path = path + noise * (np.random.default_rng(seed).standard_normal((2, 4)) @ wave).T
+    return size * path + [4.5, 3.6] + np.asarray(shift)
+
+
+@pytest.fixture(scope="module")
+def task():
+    return Task.of(Demonstration(eight(), Environment(CANS)))
+
+
+def windings(path, boxes):
+    """How often a path goes round each box's centre, counter-clockwise."""
+    turns = []
+    for centre in (boxes[:, :2] + boxes[:, 2:]) / 2:
+        offset = path - centre
+        angle = np.unwrap(np.arctan2(offset[:, 1], offset[:, 0]))
+        turns.append((angle[-1] - angle[0]) / (2 * np.pi))
+    return np.round(turns)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.floats(-3, 3), st.floats(-3, 3))
+def test_objects_that_move_together_take_the_task_along(dx, dy):
+    """All boxes shifted by the same: start, subgoals and response are shifted by it (Sec. IV-B)."""
+    task = Task.of(Demonstration(eight(), Environment(CANS)))
+    adapted = task.adapt(Environment(CANS + [dx, dy, dx, dy]))
+    np.testing.assert_allclose(adapted.law.response(), task.law.response() + [dx, dy], atol=1e-9)
+
+
+def test_objects_moved_there_and_back_move_nothing(task):
+    """Adapting to a layout and back to the first gives the first task's law."""
+    there = task.adapt(Environment(CANS + [[0.4, -0.3] * 2, [-0.2, 0.6] * 2]))
+    back = there.adapt(Environment(CANS))
+    np.testing.assert_allclose(anchors(back.law), anchors(task.law), atol=1e-12)
+    assert np.abs(anchors(there.law) - anchors(task.law)).max() > 0.2
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("moves", [[[0.5, 0.6], [-0.5, -0.6]], [[-0.3, -0.5], [0.4, -0.5]], [[0.6, 0.0], [-0.4, 0.0]]])
+def test_a_figure_eight_stays_one(task, moves, turned):
+    """Round both cans in the demonstrated sense, wherever they stand now (Fig. 10)."""
+    boxes = CANS + np.tile(moves, 2)
+    adapted = task.adapt(Environment(boxes), turned=turned)
+    np.testing.assert_array_equal(windings(adapted.law.response(), boxes), windings(task.law.response(), CANS))
+
+
+def test_turned_laws_turn_with_the_layout():
+    """A layout turned as a whole turns subgoals and response with it; the plain law keeps its old directions."""
+    c, s = np.cos(0.6), np.sin(0.6)
+    R = np.array([[c, -s], [s, c]])
+    task = Task.of(Demonstration(eight(), Environment(THREE)))
+    centres = (THREE[:, :2] + THREE[:, 2:]) / 2
+    turned = (centres - 4) @ R.T + 4
+    moved = Environment(np.hstack([turned - 0.2, turned + 0.2]))
+    expected = (task.law.response() - 4) @ R.T + 4
+    error = [
+        np.abs(task.adapt(moved, turned=kind).law.response(start=expected[0])[:200] - expected[:200]).max()
+        for kind in (True, False)
+    ]
+    assert error[0] < 0.25 and error[1] > 3 * error[0]
+
+
+def test_a_can_that_is_gone_does_not_stop_the_task():
+    """With one of three objects missing, the subgoals follow those that are left."""
+    task = Task.of(Demonstration(eight(), Environment(THREE)))
+    adapted = task.adapt(Environment(THREE[[0, 2]] + 0.2))
+    assert np.isfinite(adapted.law.response()).all()
+    near_first = np.linalg.norm(task.law.subgoals - [2.5, 3.6], axis=1).argmin()
+    np.testing.assert_allclose(adapted.law.subgoals[near_first], task.law.subgoals[near_first] + 0.2, atol=0.05)
+
+
+def test_an_ambiguous_scene_is_reported(task):
+    """Two cans turned by a right angle could be either: an error with the margin, not a guess."""
+    turned = Environment([[4.3, 1.4, 4.7, 1.8], [4.3, 5.4, 4.7, 5.8]])
+    with pytest.raises(ValueError, match=r"cannot be matched with confidence: .* costs only 0.00 more"):
+        task.adapt(turned)
+
+
+def test_saved_and_loaded_it_is_the_same_task(task, tmp_path):
+    """A task comes back from JSON with the same law, and adapts the same."""
+    task.save(tmp_path / "eight.json")
+    loaded = Task.load(tmp_path / "eight.json")
+    np.testing.assert_allclose(loaded.law.response(), task.law.response(), rtol=1e-12)
+    moved = Environment(CANS + 0.3)
+    np.testing.assert_allclose(loaded.adapt(moved).law.subgoals, task.adapt(moved).law.subgoals, rtol=1e-12)
+
+
+def damaged(change):
+    def damage(content):
+        content = json.loads(json.dumps(content))
+        change(content)
+        return json.dumps(content)
+
+    return damage
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda content: json.dumps(content)[:500], "not a task"),
+        (lambda content: "[]", "format must be"),
+        (lambda content: "", "empty"),
+        (damaged(lambda c: c.update(version=99)), "version must be 1, got 99"),
+        (damaged(lambda c: c.pop("segments")), "segments"),
+        (damaged(lambda c: c["segments"].pop()), "one speed per segment"),
+        (damaged(lambda c: c["segments"][0].update(A=[[2, 0], [0, 2]])), "spectral radius"),
+        (damaged(lambda c: c["boxes"].pop()), "corners must be 0 to 3"),
+        (damaged(lambda c: c["association"]["weights"].pop()), "association must tie"),
+        (damaged(lambda c: c.update(start=[None, 1.0])), "finite"),
+    ],
+)
+def test_a_damaged_file_is_a_format_error(task, tmp_path, damage, message):
+    """The error names the file and what is wrong with it."""
+    task.save(tmp_path / "good.json")
+    bad = tmp_path / "bad.json"
+    bad.write_text(damage(json.loads((tmp_path / "good.json").read_text())))
+    with pytest.raises(FormatError, match=message) as error:
+        Task.load(bad)
+    assert "bad.json" in str(error.value)
+
+
+def test_one_demonstration_is_the_task():
+    """Learned from one demonstration, the task is that demonstration's law."""
+    shown = Demonstration(eight(), Environment(CANS))
+    np.testing.assert_allclose(learn([shown]).law.response(), shown.law.response(), atol=1e-9)
+
+
+def moved_cans(k):
+    return CANS + np.tile(np.random.default_rng(100 + k).normal(0, 0.25, (2, 2)), 2)
+
+
+def demonstrations(n, noise=0.02):
+    """The same task shown n times while the cans stand elsewhere: the walk moves with them, never twice the same."""
+    shown = Task.of(Demonstration(eight(), Environment(CANS)))
+    walks = []
+    for k in range(n):
+        law = shown.adapt(Environment(moved_cans(k))).law
+        wave = np.sin(np.arange(1, 4)[:, None] * np.linspace(0, 2 * np.pi, 160))
+        path = np.stack([np.interp(np.linspace(0, 1, 160), *column) for column in by_length(law.response())], axis=1)
+        path += noise * (np.random.default_rng(k).standard_normal((2, 3)) @ wave).T
+        walks.append(Demonstration(path, Environment(moved_cans(k))))
+    return walks
+
+
+def by_length(path):
+    walked = np.append(0.0, np.linalg.norm(np.diff(path, axis=0), axis=1).cumsum())
+    return [(walked / walked[-1], column) for column in path.T]
+
+
+def test_several_demonstrations_share_their_subgoals():
+    """Four demonstrations in four environments merge into one chain that adapts to a fifth."""
+    task = learn(demonstrations(4))
+    path = task.model.most_likely_path()
+    assert task.model.outliers() == ()
+    assert 5 <= len(path) <= 7
+    assert len(task.model.means) < sum(len(s) for s in task.model.sequences) / 2
+    boxes = CANS + np.tile([[0.3, -0.3], [-0.2, 0.3]], 2)
+    law = task.adapt(Environment(boxes)).law
+    np.testing.assert_array_equal(windings(law.response(), boxes), windings(eight(), CANS))
+
+
+def test_a_wrong_demonstration_does_not_drag_the_others():
+    """Something else among three demonstrations keeps its own branch and is reported (Sec. V)."""
+    right = demonstrations(3)
+    angle = np.linspace(0, 2 * np.pi, 120)
+    wrong = Demonstration(np.stack([4.5 + 3 * np.cos(angle), 1.0 + 0.6 * np.sin(angle)], axis=1), Environment(CANS))
+    alone, task = learn(right), learn([*right, wrong])
+    assert task.model.outliers() == (3,)
+    np.testing.assert_allclose(task.law.subgoals, alone.law.subgoals, atol=0.02)
+
+
+def test_nothing_to_learn_from():
+    """No demonstration is an error; so is one whose environment could be either way round, named by its number."""
+    with pytest.raises(ValueError, match="at least one demonstration"):
+        learn([])
+    turned = Environment([[4.3, 1.4, 4.7, 1.8], [4.3, 5.4, 4.7, 5.8]])
+    with pytest.raises(ValueError, match="demonstration 1 and .* confidence"):
+        learn([Demonstration(eight(), Environment(CANS)), Demonstration(eight(), turned)])
