@@ -17,7 +17,7 @@ figures: .venv/ready  ## simulate, observe, learn, perform and draw every figure
 
 test: .venv/ready  ## unit tests, doctests, notebooks
 	$(RUN) -m pytest -n 2 -q
-	env -u MPLBACKEND $(RUN) -m pytest --nbmake --nbmake-timeout=120 -n 2 -q -p no:doctest notebooks
+	env -u MPLBACKEND $(RUN) -m pytest --nbmake --nbmake-timeout=120 -n 2 -q -o addopts="" notebooks
 
 check: .venv/ready  ## lint and formatting
 	$(RUN) -m ruff check .

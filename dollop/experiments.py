@@ -234,3 +234,16 @@ def summary(runs):
         "finished": sum(run.finished for run in runs),
         "collisions": sum(run.collisions for run in runs),
     }
+
+
+def passing_sides(path, centres):
+    """On which side a path (M, 2) passes each centre (N, 2): +1 leaves it to the right, -1 to the left."""
+    nearest_place = nearest(path, centres).clip(1, len(path) - 2)
+    way, across = path[nearest_place + 1] - path[nearest_place - 1], centres - path[nearest_place]
+    return -np.sign(way[:, 0] * across[:, 1] - way[:, 1] * across[:, 0])
+
+
+def same_sides(run, task, sides):
+    """Whether a run of the slalom task passes every cone on the demonstrated side, `sides` in the first layout."""
+    partners = match(slalom_demonstration(0).environment, task.environment).indices[::4] // 4
+    return bool((passing_sides(run.true_poses[:, :2], task.environment.centres[partners]) == sides).all())

@@ -13,6 +13,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from tqdm import tqdm
 
+from dollop import figures_environment as environment
+from dollop import figures_learning as learning
 from dollop import figures_observing as observing
 from dollop import figures_performing as performing
 from dollop import plot
@@ -27,6 +29,16 @@ FIGURES = {
     "6b": performing.figure_6b,
     "7a": performing.figure_7a,
     "7b": performing.figure_7b,
+    "8": environment.figure_8,
+    "9": environment.figure_9,
+    "10a": environment.figure_10a,
+    "10b": environment.figure_10b,
+    "11a": learning.figure_11a,
+    "11b": learning.figure_11b,
+    "12a": learning.figure_12a,
+    "12b": learning.figure_12b,
+    "x1": environment.figure_x1,
+    "x2": learning.figure_x2,
 }
 
 

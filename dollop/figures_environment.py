@@ -18,19 +18,23 @@ def figure_8():
     """Eight corners on the left, matched to eight on the right: the paper's literal cost, and the robust matching."""
     before, after = experiments.figure_eight_task().environment, experiments.moved_environment(0)
     literal, robust = match(before, after, method="literal"), match(before, after)
-    figure, axes = plt.subplots(1, 2, figsize=(9, 4.2), sharex=True, sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.4), sharex=True, sharey=True)
+    figure.get_layout_engine().set(w_pad=0.1)
     for ax, environment, names in zip(axes, (before, after), ("12345678", ascii_lowercase[:8]), strict=True):
         plot.boxes(ax, environment.boxes)
         label_corners(ax, environment, names)
         plot.plane(ax)
-    axes[0].set(xlim=(1.2, 7.8), ylim=(1.4, 5.6), title="demonstrated")
-    axes[1].set(title="now: literal dashed, robust solid")
+    axes[0].set(xlim=(1.2, 7.8), ylim=(1.4, 5.4), title="as demonstrated")
+    axes[1].set(title="now", ylabel="")
     for matching, line, colour in ((literal, "--", plot.OCCLUDED), (robust, "-", plot.LAW)):
         for a, b in enumerate(matching.indices):
             ends = before.corners[a], after.corners[b]
             figure.add_artist(
-                ConnectionPatch(*ends, "data", "data", axesA=axes[0], axesB=axes[1], color=colour, linestyle=line)
+                ConnectionPatch(*ends, "data", "data", axesA=axes[0], axesB=axes[1], color=colour, ls=line)
             )
+    styles = {"literal (the paper's cost)": (plot.OCCLUDED, "--"), "robust (the default)": (plot.LAW, "-")}
+    lines = [plt.Line2D([], [], color=colour, ls=line, label=name) for name, (colour, line) in styles.items()]
+    figure.legend(handles=lines, loc="outside lower center", ncols=2)
     return figure, {
         "indices": robust.indices.tolist(),
         "cost": robust.cost,
@@ -55,15 +59,21 @@ def figure_9():
     environment = experiments.figure_eight_task().environment
     corners = environment.corners
     constants, forces = spring_constants(corners), spring_forces(corners)
-    figure, ax = plt.subplots(figsize=(8, 3.6))
-    plot.boxes(ax, environment.boxes, linewidth=1)
-    for m in range(len(corners)):
-        for n in range(m):
-            width = 0.4 + 1.2 * np.log10(1 + constants[m, n] / constants[constants > 0].min())
-            ax.plot(*corners[[m, n]].T, color=plot.USER, linewidth=width, alpha=0.5)
-    ax.quiver(*corners.T, *forces.T, color=plot.OBSTACLE, scale=120, width=0.004, zorder=5)
-    label_corners(ax, environment, "12345678")
-    plot.plane(ax, "springs (width grows with the logarithm of k) and forces (arrows)")
+    figure, axes = plt.subplots(1, 2, figsize=(11, 3.2), width_ratios=(2.2, 1))
+    for ax in axes:
+        for m in range(len(corners)):
+            for n in range(m):
+                width = 0.5 + 1.5 * np.log10(constants[m, n] / constants[constants > 0].min())
+                ax.plot(*corners[[m, n]].T, color=plot.USER, linewidth=width, alpha=0.5, zorder=1)
+        ax.quiver(*corners.T, *forces.T, color=plot.OBSTACLE, angles="xy", scale_units="xy", scale=110, zorder=5)
+        plot.plane(ax)
+    label_corners(axes[0], environment, "12345678")
+    low, high = corners.min(axis=0) - 0.7, corners.max(axis=0) + 0.7
+    axes[0].set(
+        xlim=(low[0], high[0]), ylim=(low[1], high[1]), title="springs, wider where stronger, and forces (arrows)"
+    )
+    middle = environment.centres[environment.centres[:, 0].argmin()]
+    axes[1].set(xlim=middle[0] + [-0.55, 0.55], ylim=middle[1] + [-0.55, 0.55], title="one box, enlarged")
     matching = match(environment, experiments.moved_environment(0), method="literal")
     return figure, {"indices": matching.indices.tolist(), "cost": matching.cost, "margin": matching.margin}
 
@@ -71,24 +81,24 @@ def figure_9():
 def figure_10a():
     """Moved obstacles, as the robot's laser sees them, and the subgoals that moved with them."""
     task, grid = experiments.figure_eight_task(), experiments.background_map()
-    figure, axes = plt.subplots(1, len(experiments.LAYOUTS), figsize=(12, 4), sharey=True)
+    figure, axes = plt.subplots(1, len(experiments.LAYOUTS), figsize=(13, 4.5), sharey=True)
     right = []
     for k, ax in enumerate(axes):
         adapted = experiments.adapted_task(k)
         plot.workspace(grid, experiments.moved_scene(k).robot, adapted.environment.boxes, ax)
-        plot.boxes(ax, task.environment.boxes, "as demonstrated", plot.BACKGROUND, linestyle="--", linewidth=1)
+        plot.boxes(ax, task.environment.boxes, "obstacles before", "black", linestyle=":", linewidth=1)
         plot.path(ax, adapted.law.response(), "control law", plot.LAW, linewidth=2)
-        ax.plot(*task.law.subgoals.T, "x", color=plot.BACKGROUND, label="subgoals before")
+        ax.plot(*task.law.subgoals.T, "x", color=plot.TRUTH, markeredgewidth=2, label="subgoals before")
         plot.subgoals(ax, adapted.law.subgoals)
         right.append(experiments.matched_right(k))
-    plot.legend(axes[1])
+    plot.legend_below(figure, axes[0])
     return figure, {"matching_right": int(sum(right)), "layouts": len(right)}
 
 
 def figure_10b():
     """The robot performing the adapted task among the moved obstacles."""
     grid = experiments.background_map()
-    figure, axes = plt.subplots(1, len(experiments.LAYOUTS), figsize=(12, 4), sharey=True)
+    figure, axes = plt.subplots(1, len(experiments.LAYOUTS), figsize=(13, 4.5), sharey=True)
     everything = []
     for k, ax in enumerate(axes):
         adapted, runs = experiments.adapted_task(k), experiments.moved_runs(k)
@@ -96,7 +106,7 @@ def figure_10b():
         plot.path(ax, adapted.law.response(), "control law", plot.LAW, linewidth=2)
         plot.runs(ax, runs)
         everything += runs
-    plot.legend(axes[1])
+    plot.legend_below(figure, axes[0])
     return figure, {
         "matching_right": int(sum(experiments.matched_right(k) for k in range(len(axes)))),
         **experiments.summary(everything),
@@ -113,6 +123,6 @@ def figure_x1():
         marker = {2: "o", 3: "s", 4: "^"}[objects]
         ax.plot(rows.noise, rows.right, marker=marker, color=colour, label=f"{method}, {objects} objects")
     ax.set(xlabel="box sizes off by up to [m]", ylabel="share of layouts all right", ylim=(0, 1.03))
-    ax.legend(ncols=2, loc="center right")
+    ax.legend(ncols=2, loc="center right", bbox_to_anchor=(1.0, 0.68))
     known = shares[shares.noise == 0.05]
     return figure, {f"{row.method}_{row.objects}": row.right for row in known.itertuples()}

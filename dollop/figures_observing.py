@@ -23,7 +23,8 @@ def figure_3():
     i = scan_beside_the_cans(log)
     plot.scan(ax, log, i)
     plot.robot(ax, log.poses[i], label="robot")
-    plot.legend(plot.plane(ax))
+    plot.plane(ax)
+    plot.legend_below(figure, ax)
     return figure, {"beams": len(log.angles), "returns": int(np.isfinite(log.ranges[i]).sum())}
 
 
@@ -141,7 +142,7 @@ def figure_6a():
     figure, ax = plt.subplots(figsize=SIZE)
     plot.workspace(experiments.background_map(), sensor, observation.environment.boxes, ax)
     plot.track(ax, user, "user's track", linewidth=0.8)
-    plot.legend(ax)
+    plot.legend_below(figure, ax)
     bias, errors = track_error(user, recording.truth, sensor)
     return figure, {
         "track_error_mean_m": errors.mean(),

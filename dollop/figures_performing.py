@@ -20,7 +20,7 @@ def figure_6b():
         plot.path(ax, lap, "laps" if k == 0 else None, linewidth=0.4, alpha=0.6)
     plot.path(ax, law.response(), "control law", plot.LAW, linewidth=2)
     plot.subgoals(ax, law.subgoals)
-    plot.legend(ax)
+    plot.legend_below(figure, ax)
     return figure, {
         "n_segments": len(law.segments),
         "mean_error_m": distance_to_polyline(mean_trajectory(laps), law.response()).mean(),
@@ -32,7 +32,7 @@ def figure_6b():
 def figure_7a():
     """Ten runs of the robot: the paper's law, and beside it the one that respects the robot's dynamics."""
     task = experiments.figure_eight_task()
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.4), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.9), sharey=True)
     metrics = {}
     for ax, control in zip(axes, ("plain", "pursuit"), strict=True):
         runs = experiments.eight_runs(control)
@@ -47,14 +47,14 @@ def figure_7a():
             "localisation_error_m": np.mean([place for place, _ in errors]),
             "localisation_error_deg": np.degrees(np.mean([turn for _, turn in errors])),
         }
-    plot.legend(axes[0])
+    plot.legend_below(figure, axes[0])
     return figure, metrics["plain"] | {f"{key}_pursuit": value for key, value in metrics["pursuit"].items()}
 
 
 def figure_7b():
     """Five runs, each kidnapped once: the paper's law, and beside it the one that goes round obstacles."""
     task = experiments.figure_eight_task()
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.4), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.9), sharey=True)
     metrics = {}
     for ax, name, choices in zip(axes, ("plain", "aware"), (("plain", False), ("pursuit", True)), strict=True):
         runs = experiments.kidnapped_runs(*choices)
@@ -62,7 +62,7 @@ def figure_7b():
         times = np.concatenate([return_times(run, task.law) for run in runs])
         back = times[np.isfinite(times)]
         metrics[name] = experiments.summary(runs) | {"return_time_s": back.mean() if len(back) else None}
-    plot.legend(axes[0])
+    plot.legend_below(figure, axes[0])
     return figure, metrics["plain"] | {f"{key}_aware": value for key, value in metrics["aware"].items()}
 
 

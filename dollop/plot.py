@@ -11,6 +11,7 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import Circle, Ellipse, Rectangle
+from matplotlib.patheffects import withStroke
 
 USER = "#0072B2"  # blue: the user's track
 OBSTACLE = "#D55E00"  # vermilion: boxes of foreground objects
@@ -22,6 +23,9 @@ RUN = "#CC79A7"  # purple: where the robot went
 OCCLUDED = "#E69F00"  # orange: predictions while the user is occluded
 BACKGROUND = "#8C8C8C"
 TRUTH = "#56B4E9"
+
+HALO = withStroke(linewidth=2.5, foreground="white")
+"""Keeps writing legible where it lies over lines."""
 
 STYLE = {
     "figure.dpi": 100,
@@ -137,7 +141,7 @@ def picture(image):
 def runs(ax, runs):
     """Where the robot went: one line per Run; a kidnapping is a dotted leap."""
     for k, run in enumerate(runs):
-        leaps = np.flatnonzero(np.linalg.norm(np.diff(run.true_poses[:, :2], axis=0), axis=1) > 0.3) + 1
+        leaps = np.searchsorted(run.t, run.kidnapped - 0.5 * run.t[1])
         for n, part in enumerate(np.split(run.true_poses[:, :2], leaps)):
             path(ax, part, "robot's runs" if k == n == 0 else None, RUN, linewidth=0.9, alpha=0.8)
         for leap in leaps:
@@ -165,15 +169,15 @@ def cdhmm(ax, model, sd=2.0):
         How many standard deviations each state's ellipse reaches.
     """
     path_steps = set(pairwise(model.most_likely_path().tolist()))
-    ax.plot([], [], color=BACKGROUND, label="steps, wide where probable")
+    ax.plot([], [], color=BACKGROUND, label="steps")
     ax.plot([], [], color=MOST_LIKELY, label="most-likely path")
     for u, v in np.argwhere(model.transitions > 0).tolist():
         colour = MOST_LIKELY if (u, v) in path_steps else BACKGROUND
         step(ax, model.means[u], model.means[v], 0.5 + 2.0 * model.transitions[u, v], colour)
     for state, (mean, covariance) in enumerate(zip(model.means, model.covariances, strict=True)):
-        label = f"states, ellipses of {sd:g} sd" if state == 0 else None
+        label = f"states, {sd:g} sd" if state == 0 else None
         ellipse(ax, mean, covariance, sd, label=label)
-        ax.annotate(str(state), mean, xytext=(6, 6), textcoords="offset points", zorder=8)
+        ax.annotate(str(state), mean, xytext=(6, 6), textcoords="offset points", zorder=8, path_effects=[HALO])
     ax.plot(*model.means.T, ".", color=SUBGOAL, markersize=6, zorder=7)
 
 
@@ -190,3 +194,8 @@ def ellipse(ax, mean, covariance, sd=2.0, colour=SUBGOAL, label=None):
     angle = np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))
     look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15, "zorder": 3}
     ax.add_patch(Ellipse(mean, width, height, angle=angle, label=label, **look))
+
+
+def legend_below(figure, ax):
+    """The legend of one of several axes, in one row under the whole figure."""
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=6, columnspacing=1.0)
