@@ -155,7 +155,10 @@ def confident_match(environment_i, environment_j, names=("the task's environment
     """
     if len(environment_i) == len(environment_j) == 1:
         return None
-    matching = match(environment_i, environment_j)
+    try:
+        matching = match(environment_i, environment_j)
+    except ValueError as error:
+        raise ValueError(f"{names[0]} and {names[1]}: {error}") from error
     if not matching.confident:
         raise ValueError(
             f"{names[0]} and {names[1]} cannot be matched with confidence: the second-best matching costs only "

@@ -9,10 +9,26 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import multivariate_normal, multivariate_t
 
-from dollop import cdhmm
 from dollop.baseline import TASKS, draw_demonstrations
-from dollop.cdhmm import END, FIRST, START, SubgoalHMM
+from dollop.cdhmm import SubgoalHMM
+from dollop.evidence import (
+    END,
+    FIRST,
+    START,
+    Graph,
+    Prior,
+    chains_of,
+    emission_evidence,
+    emission_table,
+    evidence_of,
+    graph_of,
+    outer_products,
+    prior_over,
+    transition_evidence,
+)
 from dollop.lds import LDS, Statistics
+from dollop.merging import Merging, merge_states, topological_order
+from dollop.structure import align_chain, compact, estimate_structure, mean_place, path_through
 
 SLALOM = np.array(TASKS["slalom"])
 
@@ -35,8 +51,8 @@ def members_of(model):
 
 
 def prepared(sequences, spread=0.15):
-    chains = cdhmm._chains([np.asarray(sequence, float) for sequence in sequences])
-    return chains, cdhmm._prior(chains.points, spread)
+    chains = chains_of([np.asarray(sequence, float) for sequence in sequences])
+    return chains, prior_over(chains.points, spread)
 
 
 def any_sequences(seed, n, most=5):
@@ -53,7 +69,7 @@ def any_sequences(seed, n, most=5):
 def test_emission_evidence_is_the_product_of_predictions():
     """The closed form equals predicting subgoal after subgoal by Student's t, each from those before it."""
     points = np.random.default_rng(0).normal(0, 0.3, (6, 2))
-    prior = cdhmm._Prior(kappa=0.04, nu=8.0, psi=0.1)
+    prior = Prior(kappa=0.04, nu=8.0, psi=0.1)
     expected = 0.0
     for n, point in enumerate(points):
         seen = points[:n]
@@ -61,8 +77,8 @@ def test_emission_evidence_is_the_product_of_predictions():
         scale = prior.psi * np.eye(2) + seen.T @ seen - kappa * np.outer(centre, centre)
         shape = scale * (kappa + 1) / (kappa * (nu - 1))
         expected += multivariate_t(centre, shape, df=nu - 1).logpdf(point)
-    table = cdhmm._emission_table(prior, len(points))
-    evidence = cdhmm._emission(len(points), points.sum(0), cdhmm._outer(points).sum(0), prior, table)
+    table = emission_table(prior, len(points))
+    evidence = emission_evidence(len(points), points.sum(0), outer_products(points).sum(0), prior, table)
     assert evidence == pytest.approx(expected)
 
 
@@ -74,20 +90,20 @@ def test_transition_evidence_is_the_product_of_predictions():
     for step in steps:
         expected += np.log(seen[step] / sum(seen.values()))
         seen[step] += 1
-    assert cdhmm._transition(counts) == pytest.approx([expected, 0, 0, 0])
+    assert transition_evidence(counts) == pytest.approx([expected, 0, 0, 0])
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_gains_kept_up_to_date_are_the_gains_of_evidence(seed):
     """After every merge the gain of each pair equals the evidence computed anew with that pair merged."""
     chains, prior = prepared(any_sequences(seed, 4))
-    merging = cdhmm._Merging(np.arange(len(chains.points)) + FIRST, chains, prior)
+    merging = Merging(np.arange(len(chains.points)) + FIRST, chains, prior)
     gain = np.inf
     while gain > 0:
-        before = cdhmm._evidence(merging.labels, chains, prior)
+        before = evidence_of(merging.labels, chains, prior)
         for a, b in np.argwhere(~merging.blocked):
             merged = np.where(merging.labels == merging.names[b], merging.names[a], merging.labels)
-            assert merging.gain[a, b] == pytest.approx(cdhmm._evidence(merged, chains, prior) - before, abs=1e-9)
+            assert merging.gain[a, b] == pytest.approx(evidence_of(merged, chains, prior) - before, abs=1e-9)
         u, v, gain = merging.best()
         if gain > 0:
             merging.merge(u, v)
@@ -109,20 +125,20 @@ def test_alignment_is_the_best_of_all(seed):
     sequences = any_sequences(seed, 3, most=4)
     chains, prior = prepared(sequences)
     rest = chains.slices[0].stop
-    labels = cdhmm._compact(cdhmm._merge(np.arange(len(chains.points)) + FIRST, chains, prior))
+    labels = compact(merge_states(np.arange(len(chains.points)) + FIRST, chains, prior))
     labels[:rest] = START
-    labels[rest:] = cdhmm._compact(labels[rest:])
-    graph = cdhmm._graph(labels, chains)
-    place = cdhmm._mean_place(labels, chains, len(graph.n))
-    table = cdhmm._emission_table(prior, len(labels))
-    aligned, gain = cdhmm._align(chains.points[:rest], place, graph, prior, table)
-    order = [node for node in cdhmm._topological_order(graph.counts, place) if node >= FIRST]
+    labels[rest:] = compact(labels[rest:])
+    graph = graph_of(labels, chains)
+    place = mean_place(labels, chains, len(graph.n))
+    table = emission_table(prior, len(labels))
+    aligned, gain = align_chain(chains.points[:rest], place, graph, prior, table)
+    order = [node for node in topological_order(graph.counts, place) if node >= FIRST]
 
     def evidence(chain):
         own = len(graph.n) + np.arange(rest)
-        return cdhmm._evidence(np.concatenate([np.where(chain < 0, own, chain), labels[rest:]]), chains, prior)
+        return evidence_of(np.concatenate([np.where(chain < 0, own, chain), labels[rest:]]), chains, prior)
 
-    without = cdhmm._emission(graph.n, graph.s, graph.q, prior, table).sum() + cdhmm._transition(graph.counts).sum()
+    without = emission_evidence(graph.n, graph.s, graph.q, prior, table).sum() + transition_evidence(graph.counts).sum()
     best = max(evidence(chain) for chain in alignments(rest, order))
     assert evidence(aligned) == pytest.approx(best)
     assert gain == pytest.approx(best - without)
@@ -136,7 +152,7 @@ def partitions(size):
 
 
 def is_acyclic(counts):
-    return len(cdhmm._topological_order(counts, np.zeros(len(counts)))) == len(counts)
+    return len(topological_order(counts, np.zeros(len(counts)))) == len(counts)
 
 
 def test_structure_has_nearly_always_the_highest_evidence_of_all():
@@ -148,9 +164,9 @@ def test_structure_has_nearly_always_the_highest_evidence_of_all():
         task = random.uniform(-0.5, 0.5, (3, 2))
         sequences = [task[rows] + random.normal(0, 0.15, (len(rows), 2)) for rows in ([0, 1, 2], [0, 2], [0, 1])]
         chains, prior = prepared(sequences)
-        graphs = [(labels + FIRST, cdhmm._graph(labels + FIRST, chains).counts) for labels in every]
-        best = max(cdhmm._evidence(labels, chains, prior) for labels, counts in graphs if is_acyclic(counts))
-        hits += cdhmm._evidence(cdhmm._structure(chains, prior), chains, prior) >= best - 1e-9
+        graphs = [(labels + FIRST, graph_of(labels + FIRST, chains).counts) for labels in every]
+        best = max(evidence_of(labels, chains, prior) for labels, counts in graphs if is_acyclic(counts))
+        hits += evidence_of(estimate_structure(chains, prior), chains, prior) >= best - 1e-9
     assert hits >= 24
 
 
@@ -181,7 +197,7 @@ def test_most_likely_path_is_the_best_of_all(seed):
         shares = [counts[u, v] / counts[u].sum() for u, v in pairwise(path)]
         return round(float(np.prod(shares)), 12), -len(path), n[list(path)].sum()
 
-    path = (START, *cdhmm._path(cdhmm._Graph(n, None, None, counts)).tolist(), END)
+    path = (START, *path_through(Graph(n, None, None, counts)).tolist(), END)
     assert merit(path) == max(merit(each) for each in all_paths(counts))
 
 

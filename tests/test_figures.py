@@ -47,7 +47,7 @@ def test_unknown_figures_are_named_with_the_known_ones(capsys):
     """An unknown id lists what there is."""
     with pytest.raises(SystemExit):
         figures.main(["99"])
-    assert "no figure 99; known: 1, 3" in capsys.readouterr().err
+    assert "no figure 99; known: 1, 2" in capsys.readouterr().err
 
 
 def test_a_folder_that_cannot_be_made_is_said_before_the_work(tmp_path, capsys):

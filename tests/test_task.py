@@ -196,3 +196,6 @@ def test_nothing_to_learn_from():
     turned = Environment([[4.3, 1.4, 4.7, 1.8], [4.3, 5.4, 4.7, 5.8]])
     with pytest.raises(ValueError, match="demonstration 1 and .* confidence"):
         learn([Demonstration(eight(), Environment(CANS)), Demonstration(eight(), turned)])
+    alone = Environment(CANS[:1])
+    with pytest.raises(ValueError, match="demonstration 1 and .*at least 2 objects, got 1 and 2"):
+        learn([Demonstration(eight(), Environment(CANS)), Demonstration(eight(), alone)])
