@@ -1,6 +1,6 @@
 # make figures   set up .venv from the lock, then regenerate every figure
 # make test      the same set-up, then unit tests, doctests and the notebooks
-.PHONY: help figures test check bench data clean
+.PHONY: help figures test check study bench book data clean
 .DEFAULT_GOAL := help
 
 # The lock is for Python 3.11: the first of these that really is one.
@@ -24,8 +24,14 @@ check: .venv/ready  ## lint and formatting
 	$(RUN) -m ruff format --check .
 	$(RUN) -m nbstripout --verify notebooks/*.ipynb
 
+study: .venv/ready  ## test the paper's claims over a hundred seeds; goes on where it was
+	$(RUN) -m dollop.cli study
+
 bench: .venv/ready  ## benchmarks beside plain baselines, one thread
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(RUN) -m benchmarks
+
+book: .venv/ready  ## execute the notebooks and lay them out as HTML pages in build/book
+	$(RUN) book/build.py
 
 data: .venv/ready  ## remake the recordings in data/ that the notebooks read
 	$(RUN) -m dollop.cli data

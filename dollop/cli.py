@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from dollop import plot
+from dollop import plot, study
 from dollop.files import whole_file
 from dollop.gridmap import OccupancyGrid
 from dollop.logs import read_log, write_log
@@ -41,6 +41,7 @@ def parser():
     data = commands.add_parser("data", help="remake the recordings that the notebooks read")
     data.add_argument("--folder", type=Path, default=Path("data"), help="where to write (default: data)")
     data.set_defaults(run=record_data)
+    study.add_arguments(commands.add_parser("study", help="test the paper's claims over many seeds"))
     return root
 
 

@@ -102,10 +102,41 @@ def adapted_task(k):
 def matched_right(k):
     """Whether the cans were matched as they were moved, first to first and second to second."""
     before, after = figure_eight_task().environment, moved_environment(k)
-    place = nearest(before.centres, moved_scene(k).positions - LAYOUTS[k])
-    truth = nearest(after.centres, moved_scene(k).positions)[np.argsort(place)]
-    expected = 4 * truth[place.argsort().argsort()][:, None] + np.arange(4)
-    return bool(np.array_equal(match(before, after).indices, expected.ravel()))
+    order = nearest(before.centres, figure_eights().scene.positions), nearest(after.centres, moved_scene(k).positions)
+    truth = 4 * order[1][order[0].argsort()][:, None] + np.arange(4)
+    return bool(np.array_equal(match(before, after).indices, truth.ravel()))
+
+
+@cache
+def matchings_from_laser(kind, count=50):
+    """Shares of layouts matched right between boxes as the laser saw them, cans or cones moved by 0.3 m (sd).
+
+    Parameters
+    ----------
+    kind : str
+        "cans" (two) or "cones" (four).
+    count : int
+        Random layouts; where the robot sees another number of objects, neither method is right.
+
+    Returns
+    -------
+    dict
+        By method.
+    """
+    from dollop.lab import figure_eight_scene, rearranged, slalom_scene, watch
+
+    first = {"cans": figure_eight_scene, "cones": slalom_scene}[kind]()
+    rng = np.random.default_rng([SEED, 1])
+    scenes = [first, *(rearranged(first, rng, reach=0.3, spacing=0.5) for _ in range(count))]
+    seen = [observe(watch(scene, k).log, background_map()).environment for k, scene in enumerate(scenes)]
+    order = [nearest(environment.centres, scene.positions) for environment, scene in zip(seen, scenes, strict=True)]
+    whole = [k for k in range(1, count + 1) if len(seen[k]) == len(seen[0])]
+    right = {method: 0 for method in ("literal", "robust")}
+    for k in whole:
+        truth = 4 * order[k][order[0].argsort()][:, None] + np.arange(4)
+        for method in right:
+            right[method] += np.array_equal(match(seen[0], seen[k], method).indices, truth.ravel())
+    return {method: number / count for method, number in right.items()}
 
 
 def nearest(points, places):

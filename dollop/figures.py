@@ -1,7 +1,7 @@
 """Every numbered figure of the paper, regenerated: python -m dollop.figures [id ...].
 
 Each figure is one function that returns the drawing and its numbers, in the modules named after what they show. This
-one writes a PNG per panel and keeps the numbers in metrics.json.
+one writes a PNG per panel, keeps the numbers in metrics.json, and lays both out as a gallery.
 """
 
 import argparse
@@ -17,11 +17,12 @@ from dollop import figures_environment as environment
 from dollop import figures_learning as learning
 from dollop import figures_observing as observing
 from dollop import figures_performing as performing
-from dollop import plot
+from dollop import gallery, plot
 from dollop.files import whole_file
 
 FIGURES = {
     "1": observing.figure_1,
+    "2": observing.figure_2,
     "3": observing.figure_3,
     "4": observing.figure_4,
     "5": observing.figure_5,
@@ -86,7 +87,9 @@ def main(arguments=None):
     with whole_file(written, "w") as stream:
         json.dump(metrics, stream, indent=1)
         stream.write("\n")
-    print(f"wrote {len(panels)} panels and metrics.json into {options.folder}/")
+    with whole_file(options.folder / "README.md", "w") as stream:
+        stream.write(gallery.page(metrics, name_of))
+    print(f"wrote {len(panels)} panels, metrics.json and the gallery README.md into {options.folder}/")
 
 
 if __name__ == "__main__":

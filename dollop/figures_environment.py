@@ -125,4 +125,7 @@ def figure_x1():
     ax.set(xlabel="box sizes off by up to [m]", ylabel="share of layouts all right", ylim=(0, 1.03))
     ax.legend(ncols=2, loc="center right", bbox_to_anchor=(1.0, 0.68))
     known = shares[shares.noise == 0.05]
-    return figure, {f"{row.method}_{row.objects}": row.right for row in known.itertuples()}
+    by_laser = {kind: experiments.matchings_from_laser(kind) for kind in ("cans", "cones")}
+    return figure, {f"{row.method}_{row.objects}": row.right for row in known.itertuples()} | {
+        f"{method}_{kind}_seen": share for kind, found in by_laser.items() for method, share in found.items()
+    }

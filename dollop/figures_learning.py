@@ -8,12 +8,12 @@ from scipy.stats import binomtest
 from dollop import baseline, experiments, plot
 
 SPREAD = 0.15  # m, standard deviation of a subgoal in figure x2
-NUMBERS, FEW = tuple(range(1, 11)), (2, 5, 10)  # of demonstrations
+NUMBERS, FEW = (1, 2, 3, 4, 5, 7, 10), (2, 5, 10)  # of demonstrations
 LINES = {  # method: name in the metrics, colour, marker, seeds, numbers of demonstrations
     "merging": ("merging", plot.LAW, "o", 50, NUMBERS),
     "plain mean": ("mean", plot.BACKGROUND, "v", 50, NUMBERS),
-    "HMM, BIC": ("hmm", plot.USER, "s", 4, FEW),
-    "left-to-right HMM, BIC": ("left_to_right", plot.OCCLUDED, "^", 4, FEW),
+    "HMM, BIC": ("hmm", plot.USER, "s", 3, FEW),
+    "left-to-right HMM, BIC": ("left_to_right", plot.OCCLUDED, "^", 3, FEW),
 }
 
 

@@ -1,12 +1,13 @@
-"""Figures 1 and 3 to 6a: the laboratory, and observing the user (Sec. II)."""
+"""Figures 1 to 6a: the laboratory, the way of the data, and observing the user (Sec. II)."""
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.patches import ConnectionPatch
+from matplotlib.patches import ConnectionPatch, Rectangle
 
+import dollop
 from dollop import experiments, plot
 from dollop.foreground import ForegroundGrid, endpoints, foreground_mask
-from dollop.observation import foreground_hits
+from dollop.observation import foreground_hits, static_boxes
 
 
 def figure_1():
@@ -14,6 +15,75 @@ def figure_1():
     from dollop.lab import render_robot
 
     return plot.picture(render_robot()), {}
+
+
+def figure_2():
+    """Conceptual flow diagram of Dollop: each stage in the paper's words, what does it here, what it hands on."""
+    figure, ax = plt.subplots(figsize=(13, 4.6))
+    for corner, size, words in FRAMES:
+        draw_frame(ax, corner, size, words)
+    for place, words, does, record in WAY.values():
+        draw_stage(ax, place, words, f"{does.__qualname__}\n→ {record.__name__}")
+    for before, after in WAY_ON:
+        draw_step(ax, WAY[before][0], WAY[after][0])
+    ax.set(xlim=(-1.4, 15.1), ylim=(-0.85, 4.35), aspect="equal")
+    ax.set_axis_off()
+    return figure, {}
+
+
+STAGE = 2.3, 1.1  # width and height of a stage in the drawing
+WAY = {  # stage: its place in the drawing, the paper's word for it, what does it, what that returns
+    "log": ((0, 3), "laser log", dollop.read_log, dollop.LaserLog),
+    "background": ((0, 0), "background map", dollop.OccupancyGrid.load, dollop.OccupancyGrid),
+    "observe": ((2.7, 1.5), "observing the user", dollop.observe, dollop.Observation),
+    "subgoals": ((5.4, 3), "computing subgoals", dollop.SequencedLDS.fit, dollop.SequencedLDS),
+    "configure": ((5.4, 0), "environment\nconfiguration", static_boxes, dollop.Environment),
+    "associate": ((8.1, 1.5), "associating\nsubgoals", dollop.associate, dollop.Association),
+    "map": ((10.95, 3), "mapping\ndemonstrations", dollop.match, dollop.Matching),
+    "learn": ((13.65, 3), "learning the\ntask structure", dollop.SubgoalHMM.fit, dollop.SubgoalHMM),
+    "new": ((10.95, 0), "a new environment", dollop.observe, dollop.Observation),
+    "adapt": ((13.65, 1.5), "updating subgoals", dollop.Task.adapt, dollop.Task),
+    "perform": ((13.65, 0), "performing the task", dollop.perform, dollop.Run),
+}
+WAY_ON = (
+    ("log", "observe"),
+    ("background", "observe"),
+    ("observe", "subgoals"),
+    ("observe", "configure"),
+    ("subgoals", "associate"),
+    ("configure", "associate"),
+    ("associate", "map"),
+    ("map", "learn"),
+    ("learn", "adapt"),
+    ("new", "adapt"),
+    ("adapt", "perform"),
+)
+FRAMES = (  # lower left corner, width and height, what holds for the stages in it
+    ((1.4, -0.7), (8.0, 4.85), "once per demonstration"),
+    ((9.65, 2.3), (5.3, 1.85), f"all demonstrations: {dollop.learn.__name__} → {dollop.Task.__name__}"),
+)
+
+
+def draw_frame(ax, corner, size, words):
+    """A grey field behind stages that belong together, with words along its upper edge."""
+    ax.add_patch(Rectangle(corner, *size, facecolor="#EBEBEB", zorder=0))
+    ax.text(corner[0] + 0.12, corner[1] + size[1] - 0.12, words, va="top", style="italic", color="0.3")
+
+
+def draw_stage(ax, place, words, code):
+    """A box with a stage's name in words, and under it the names in the code."""
+    lower_left = np.subtract(place, np.divide(STAGE, 2))
+    ax.add_patch(Rectangle(lower_left, *STAGE, facecolor="white", edgecolor=plot.USER, linewidth=1.5, zorder=2))
+    ax.text(*place + np.array([0, 0.23]), words, ha="center", va="center", weight="bold", zorder=3, linespacing=1.0)
+    ax.text(*place - np.array([0, 0.28]), code, ha="center", va="center", family="monospace", fontsize=8, zorder=3)
+
+
+def draw_step(ax, before, after):
+    """An arrow from one stage's edge to the next one's."""
+    sideways, upwards = np.sign(np.subtract(after, before))
+    across = before[1] == after[1] or before[0] != after[0]
+    half = np.divide(STAGE, 2) * ((sideways, 0) if across else (0, upwards))
+    ax.annotate("", after - half, before + half, arrowprops={"arrowstyle": "-|>", "linewidth": 1.5}, zorder=4)
 
 
 def figure_3():

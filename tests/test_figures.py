@@ -18,7 +18,7 @@ def test_every_panel_is_committed():
         assert (folder / figures.name_of(panel)).stat().st_size > 5_000
 
 
-@pytest.mark.parametrize("panel", ["3", "6a", "6b"])
+@pytest.mark.parametrize("panel", ["3", "6a", "6b", "8", "10a", "11a", "12a"])
 def test_fresh_numbers_equal_the_committed_ones(panel, tmp_path):
     """Simulated anew from the seed, a panel's numbers are those of metrics.json."""
     pytest.importorskip("pybullet")
@@ -36,11 +36,38 @@ def test_the_same_figure_twice_is_the_same_file(tmp_path):
     assert (first / "fig_06b.png").read_bytes() == (second / "fig_06b.png").read_bytes()
 
 
-def test_the_headline_numbers_are_in_their_bands():
+def test_observing_and_segmenting_are_in_their_bands():
     """Fig. 6: the track within 60 mm, 5 to 7 segments, at most 20 mm."""
     assert COMMITTED["6a"]["track_error_mean_m"] < 0.060
     assert 5 <= COMMITTED["6b"]["n_segments"] <= 7
     assert COMMITTED["6b"]["mean_error_m"] <= 0.020
+
+
+def test_performing_is_in_its_bands():
+    """Fig. 7: ten runs finish, no collision, 80 mm (plain) and 40 mm from the law; aware of obstacles none is hit."""
+    runs, kidnapped = COMMITTED["7a"], COMMITTED["7b"]
+    assert runs["finished"] == runs["finished_pursuit"] == 10
+    assert runs["collisions"] == runs["collisions_pursuit"] == 0
+    assert runs["mean_distance_m"] <= 0.080 and runs["mean_distance_m_pursuit"] <= 0.040
+    assert runs["localisation_error_m"] <= 0.05 and runs["localisation_error_deg"] <= 3
+    assert kidnapped["finished_aware"] == 5 and kidnapped["collisions_aware"] == 0
+
+
+def test_moved_objects_are_in_their_bands():
+    """Figs 10 and x1: three layouts matched right, all runs finish; robust matching right where the literal is not."""
+    assert COMMITTED["10a"]["matching_right"] == 3
+    assert COMMITTED["10b"]["finished"] == 30 and COMMITTED["10b"]["collisions"] == 0
+    shares = COMMITTED["x1"]
+    assert shares["robust_2"] >= 0.99 and shares["robust_3"] >= 0.97 and shares["robust_4"] >= 0.90
+    assert shares["robust_cans_seen"] >= 0.95 > shares["literal_cans_seen"]
+
+
+def test_learning_is_in_its_bands():
+    """Figs 12 and x2: runs finish on the demonstrated side; merging is right from two demonstrations on."""
+    assert COMMITTED["12a"]["path_length"] <= COMMITTED["12a"]["states_after"] < COMMITTED["12a"]["states_before"]
+    runs = COMMITTED["12b"]
+    assert runs["finished"] == runs["passed_on_the_demonstrated_side"] == 10 and runs["collisions"] == 0
+    assert COMMITTED["x2"]["right_merging_2"] >= 0.95 and COMMITTED["x2"]["right_merging_5"] >= 0.99
 
 
 def test_unknown_figures_are_named_with_the_known_ones(capsys):

@@ -1,0 +1,364 @@
+"""The study behind REPLICATION.md: every claim's experiment over many seeds, on all cores or on a Dask cluster.
+
+Results go into one tidy table, study/results.csv: a row per claim, seed and number. It is replaced whole after every
+seed that is done, so that an interrupted study goes on where it was. From the table come claims.json, and with it the
+table of claims in REPLICATION.md.
+"""
+
+import json
+import sys
+import tempfile
+from contextlib import contextmanager, nullcontext
+from math import isfinite, nan
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pandas as pd
+from scipy import stats
+from tqdm import tqdm
+
+from dollop.claims import CLAIMS
+from dollop.files import FormatError, whole_file
+
+COLUMNS = ["claim", "seed", "number", "value"]
+SEEDS, QUICK_SEEDS = 100, 3
+ATTEMPTS = 3
+"""How often in a row workers may die without a seed being finished before the study gives up."""
+
+BEGIN, END = "<!-- claims: begin -->", "<!-- claims: end -->"
+
+
+# ---- running
+
+
+def work(seed, ids, claims=None):
+    """Every experiment of some claims for one seed; one experiment may serve several claims.
+
+    Parameters
+    ----------
+    seed : int
+    ids : sequence of str
+        Of claims.
+    claims : dict of Claim, optional
+        The paper's by default.
+
+    Returns
+    -------
+    seed : int
+    rows : list of (str, int, str, float)
+        As in the table.
+    failures : list of str
+        What went wrong, by claim; the others go on.
+    """
+    claims, found, rows, failures = claims or CLAIMS, {}, [], []
+    for id in ids:
+        claim = claims[id]
+        try:
+            if claim.experiment not in found:
+                found[claim.experiment] = claim.experiment(seed)
+        except Exception as error:  # whatever it is, the other claims' results are not lost
+            failures.append(f"claim {id}, seed {seed}: {type(error).__name__}: {error}")
+            continue
+        numbers = found[claim.experiment]
+        rows += [(id, seed, each.number, float(f"{numbers[each.number]:.6g}")) for each in claim.criteria]
+    return seed, rows, failures
+
+
+def run_study(ids, seeds, table_path, scheduler=None, claims=None, jobs=-1):
+    """Fill the table with what is missing in it, seed by seed.
+
+    Parameters
+    ----------
+    ids : sequence of str
+        Of claims.
+    seeds : sequence of int
+    table_path : Path
+        The table; made if it is not there.
+    scheduler : str, optional
+        Address of a Dask scheduler; all cores of this machine without it.
+    claims : dict of Claim, optional
+        The paper's by default.
+    jobs : int
+        Number of worker processes on this machine, -1 for one per core.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The table.
+
+    Raises
+    ------
+    RuntimeError
+        If experiments failed, or workers kept dying; all that was finished is in the table.
+    """
+    table, failures, deaths = read_table(table_path), [], 0
+    todo = missing(table, ids, seeds)
+    with tqdm(total=len(todo), desc="study", unit="seed", file=sys.stderr) as bar, workers(scheduler, jobs) as done:
+        while todo:
+            try:
+                for seed, rows, failed in done([joblib.delayed(work)(*job, claims) for job in todo.items()]):
+                    table = pd.concat([table, as_table(rows)], ignore_index=True)
+                    write_table(table, table_path)
+                    failures += failed
+                    deaths = 0
+                    del todo[seed]
+                    bar.update()
+            except Exception as error:
+                if not a_worker_died(error):
+                    raise
+                deaths += 1
+                tqdm.write(f"a worker died ({type(error).__name__}); trying {len(todo)} seeds again", sys.stderr)
+                if deaths == ATTEMPTS:
+                    raise RuntimeError(
+                        f"workers died {ATTEMPTS} times in a row over the seeds {list(todo)}; what was done is kept"
+                    ) from error
+    if failures:
+        raise RuntimeError(f"{len(failures)} experiments failed: {'; '.join(failures)}")
+    return table
+
+
+@contextmanager
+def workers(scheduler=None, jobs=-1):
+    """What runs jobs and yields their results as they come: processes here, or those of a Dask cluster."""
+    with dask_backend(scheduler) if scheduler else nullcontext():
+        yield lambda delayed: joblib.Parallel(jobs, return_as="generator_unordered", batch_size=1)(delayed)
+
+
+@contextmanager
+def dask_backend(scheduler):
+    """joblib on the Dask cluster at an address."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ImportError(f"a Dask cluster needs the extra cluster: pip install dollop[cluster] ({error})") from error
+    with Client(scheduler), joblib.parallel_config("dask"):
+        yield
+
+
+def a_worker_died(error):
+    """Whether it is the worker that failed, not the experiment."""
+    return any(kind.__name__ in ("BrokenProcessPool", "KilledWorker") for kind in type(error).__mro__)
+
+
+def missing(table, ids, seeds):
+    """The claims that each seed still lacks, {seed: list of ids}, in the order given."""
+    done = set(zip(table.claim, table.seed, strict=True))
+    lacking = {seed: [id for id in ids if (id, seed) not in done] for seed in seeds}
+    return {seed: ids for seed, ids in lacking.items() if ids}
+
+
+def as_table(rows=()):
+    """Rows as the table."""
+    return pd.DataFrame(list(rows), columns=COLUMNS).astype({"seed": int, "value": float})
+
+
+def read_table(path):
+    """The table at a path, an empty one if there is none.
+
+    Raises
+    ------
+    FormatError
+        If the file is something else.
+    """
+    if not path.exists():
+        return as_table()
+    try:
+        table = pd.read_csv(path).astype({"seed": int, "value": float})
+    except (KeyError, ValueError) as error:
+        raise FormatError(f"not a table of results: {error}", path) from error
+    if list(table.columns) != COLUMNS:
+        raise FormatError(f"columns must be {COLUMNS}, got {list(table.columns)}", path)
+    return table
+
+
+def write_table(table, path):
+    """Write the table in order, whole or not at all."""
+    with whole_file(path, "w") as stream:
+        table.sort_values(["claim", "seed"], kind="stable").to_csv(stream, index=False)
+
+
+# ---- summing up
+
+
+def interval(values, share=False, level=0.95):
+    """Mean of values (N,) and its interval: Student's, or for a share Wilson's.
+
+    Examples
+    --------
+    >>> mean, low, high = interval([0, 1, 1, 1, 1, 1, 1, 1, 1, 1], share=True)
+    >>> round(mean, 2), round(low, 2), round(high, 2)
+    (0.9, 0.6, 0.98)
+    """
+    values = np.asarray(values, float)
+    if not len(values):
+        return nan, nan, nan
+    if share:
+        ends = stats.binomtest(int(values.sum()), len(values)).proportion_ci(level, "wilson")
+        return values.mean(), ends.low, ends.high
+    reach = stats.sem(values) * stats.t.ppf((1 + level) / 2, len(values) - 1) if len(values) > 1 else np.inf
+    return values.mean(), values.mean() - reach, values.mean() + reach
+
+
+def summary(claim, rows):
+    """One claim's numbers over the seeds, and its verdict, as plain values for JSON.
+
+    Parameters
+    ----------
+    claim : Claim
+    rows : pandas.DataFrame
+        Of the table, those of this claim.
+    """
+    numbers = [measured(each, rows.value[rows.number == each.number].dropna()) for each in claim.criteria]
+    return {
+        "id": claim.id,
+        "section": claim.section,
+        "quote": claim.quote,
+        "experiment": claim.setup,
+        "seeds": int(rows.seed.nunique()),
+        "numbers": numbers,
+        "verdict": verdict([each["met"] for each in numbers if each["met"]]),
+    }
+
+
+def measured(criterion, values):
+    """One number over the seeds: mean, interval, what is wanted, whether that is met, and the band; open ends None."""
+    mean, low, high = interval(values, criterion.share)
+    wanted = criterion.wanted
+    return {
+        "number": criterion.number,
+        "meaning": criterion.meaning,
+        "mean": short(mean),
+        "low": short(low),
+        "high": short(high),
+        "seeds": len(values),
+        "wanted": wanted and closed(wanted),
+        "met": wanted and met(low, high, wanted),
+        "band": closed(criterion.band),
+    }
+
+
+def short(value):
+    """A number to four significant digits, None for nan."""
+    return float(f"{value:.4g}") if isfinite(value) else None
+
+
+def closed(range_):
+    """A range for JSON, which knows no infinity."""
+    return [end if isfinite(end) else None for end in range_]
+
+
+def met(low, high, wanted):
+    """Whether an interval lies in what is wanted: "yes", "no" if it lies wholly beside it, else "open"."""
+    if wanted[0] < low and high <= wanted[1]:
+        return "yes"
+    return "no" if high <= wanted[0] or low > wanted[1] else "open"
+
+
+def verdict(answers):
+    """The rule: it holds if every criterion is met, and does not if none is and one is clearly not; else in part."""
+    if all(answer == "yes" for answer in answers):
+        return "holds"
+    return "does not hold" if "no" in answers and "yes" not in answers else "holds in part"
+
+
+def summaries(table, claims=None):
+    """Summaries of all claims in the table, in the paper's order."""
+    claims = claims or CLAIMS
+    return [summary(claim, table[table.claim == id]) for id, claim in claims.items() if (table.claim == id).any()]
+
+
+def claims_table(found):
+    """The claims as a Markdown table: the words, the numbers with 95 % intervals, what is wanted, the verdict."""
+    lines = ["| claim | Sec. | the paper's words | number: mean [95 % interval] | wanted | verdict |", "|" + "---|" * 6]
+    for claim in found:
+        numbers = "<br>".join(f"{n['meaning']}: {amount(n)}" for n in claim["numbers"])
+        wanted = "<br>".join(wish(n["wanted"]) for n in claim["numbers"])
+        quote = f"“{claim['quote']}”"
+        lines.append(
+            f"| `{claim['id']}` | {claim['section']} | {quote} | {numbers} | {wanted} | **{claim['verdict']}** |"
+        )
+    return "\n".join(lines)
+
+
+def amount(number):
+    """A number with its interval."""
+    if number["low"] is None:
+        return "no interval"
+    return f"{number['mean']:.3g} [{number['low']:.3g}, {number['high']:.3g}]"
+
+
+def wish(wanted):
+    """A range in words."""
+    if wanted is None:
+        return "(told)"
+    low, high = wanted
+    if high is None:
+        return f"> {low:g}"
+    return f"< {high:g}" if low is None else f"{low:g} to {high:g}"
+
+
+def put_between_marks(text, content):
+    """The text with what stands between the marks replaced."""
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        raise ValueError(f"the report must hold {BEGIN} and {END} once each")
+    before, rest = text.split(BEGIN)
+    return f"{before}{BEGIN}\n{content}\n{END}{rest.split(END)[1]}"
+
+
+# ---- the command
+
+
+def add_arguments(parser):
+    """Arguments of `dollop study`."""
+    parser.add_argument("ids", nargs="*", metavar="claim", help=f"any of {', '.join(CLAIMS)}; all when none is given")
+    parser.add_argument("--seeds", type=int, help=f"how many seeds (default: {SEEDS})")
+    parser.add_argument("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds, for a look")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler to work on, such as tcp://host:8786")
+    parser.add_argument("--folder", type=Path, help="where the table goes (default: study; study-quick when quick)")
+    parser.set_defaults(run=command)
+
+
+def command(options):
+    """dollop study [CLAIM ...]"""
+    unknown = [id for id in options.ids if id not in CLAIMS]
+    if unknown:
+        raise ValueError(f"no claim {', '.join(unknown)}; known: {', '.join(CLAIMS)}")
+    seeds = (QUICK_SEEDS if options.quick else SEEDS) if options.seeds is None else options.seeds
+    if seeds < 2:
+        raise ValueError(f"an interval needs at least 2 seeds, got {seeds}")
+    folder = options.folder or Path("study-quick" if options.quick else "study")
+    check_writable(folder)
+    try:
+        table = run_study(options.ids or list(CLAIMS), range(seeds), folder / "results.csv", options.scheduler)
+    except RuntimeError as error:
+        raise ValueError(f"{error}. Run the same command again to go on") from error
+    found = summaries(table)
+    report(found, folder)
+
+
+def check_writable(folder):
+    """Raise OSError now if the folder cannot be written to later."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise OSError(f"the folder {folder} cannot be written to: {error}") from error
+
+
+def report(found, folder):
+    """Write claims.json: into a quick study's folder, or beside REPLICATION.md, whose table of claims it then is."""
+    for claim in found:
+        print(f"{claim['id']:17}{claim['verdict']:15}{claim['seeds']:4} seeds")
+    replication = folder.parent / "REPLICATION.md"
+    full = folder.name == "study" and replication.exists()
+    written = [(folder.parent if full else folder) / "claims.json"]
+    with whole_file(written[0], "w") as stream:
+        json.dump(found, stream, indent=1, ensure_ascii=False)
+        stream.write("\n")
+    if full:
+        text = put_between_marks(replication.read_text(), claims_table(found))
+        with whole_file(replication, "w") as stream:
+            stream.write(text)
+        written.append(replication)
+    print(f"wrote {', '.join(map(str, [folder / 'results.csv', *written]))}")

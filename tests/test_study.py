@@ -1,0 +1,286 @@
+"""The study: resumed, retried, spread over a cluster, summed up by rule; and the experiments' own measures."""
+
+import json
+import os
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dollop import claims, study
+from dollop.claims import Claim, Criterion
+from dollop.cli import main
+from dollop.files import FormatError
+
+
+def claim_of(experiment):
+    """A claim that wants a positive number of an experiment."""
+    criterion = Criterion("number", "a number", (0, np.inf), (0, 1))
+    return Claim("fake", "I", "words", experiment, (criterion,), "nothing")
+
+
+def counting(folder):
+    """An experiment that leaves a file for every time it is run."""
+
+    def experiment(seed):
+        (folder / f"{seed}-{len(list(folder.glob(f'{seed}-*')))}").touch()
+        return {"number": np.random.default_rng(seed).normal(5.0)}
+
+    return {"fake": claim_of(experiment)}
+
+
+def dying(folder, always=False):
+    """An experiment whose worker dies at seed 1, the first time or always."""
+
+    def experiment(seed):
+        marker = folder / "died"
+        if seed == 1 and (always or not marker.exists()):
+            marker.touch()
+            os._exit(1)
+        return {"number": float(seed)}
+
+    return {"fake": claim_of(experiment)}
+
+
+def stumbling(folder):
+    """An experiment that fails at seed 1, the first time."""
+    counted = counting(folder)["fake"].experiment
+
+    def experiment(seed):
+        if seed == 1 and not (folder / "stumbled").exists():
+            (folder / "stumbled").touch()
+            raise ValueError("a stone")
+        return counted(seed)
+
+    return {"fake": claim_of(experiment)}
+
+
+@pytest.fixture
+def runs(tmp_path):
+    """Folder in which experiments leave their marks."""
+    (tmp_path / "runs").mkdir()
+    return tmp_path / "runs"
+
+
+def test_a_study_goes_on_where_it_was(tmp_path, runs):
+    """Seeds that are in the table are kept as they are and not run again."""
+    table = tmp_path / "results.csv"
+    first = study.run_study(["fake"], range(2), table, claims=counting(runs), jobs=1)
+    both = study.run_study(["fake"], range(4), table, claims=counting(runs), jobs=2)
+    assert sorted(path.name for path in runs.iterdir()) == ["0-0", "1-0", "2-0", "3-0"]
+    assert sorted(both.seed) == [0, 1, 2, 3]
+    assert both[both.seed < 2].sort_values("seed").value.tolist() == first.sort_values("seed").value.tolist()
+
+
+def test_an_interrupted_study_loses_nothing(tmp_path, runs, monkeypatch):
+    """What was done before Ctrl-C is in the table, and only the rest is run after it."""
+    table, write, written = tmp_path / "results.csv", study.write_table, []
+
+    def interrupted(*arguments):
+        write(*arguments)
+        written.append(1)
+        if len(written) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(study, "write_table", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        study.run_study(["fake"], range(5), table, claims=counting(runs), jobs=1)
+    assert len(study.read_table(table)) == 2
+    monkeypatch.undo()
+    study.run_study(["fake"], range(5), table, claims=counting(runs), jobs=1)
+    assert sorted(study.read_table(table).seed) == [0, 1, 2, 3, 4]
+    assert len([path for path in runs.iterdir() if path.name.startswith(("0-", "1-"))]) == 2
+
+
+def test_a_failed_experiment_is_named_and_run_again(tmp_path, runs):
+    """The others are kept, the message names claim, seed and reason, and the next call runs that seed alone."""
+    table, stumble = tmp_path / "results.csv", stumbling(runs)
+    with pytest.raises(RuntimeError, match="claim fake, seed 1: ValueError: a stone"):
+        study.run_study(["fake"], range(3), table, claims=stumble, jobs=1)
+    assert sorted(study.read_table(table).seed) == [0, 2]
+    assert sorted(study.run_study(["fake"], range(3), table, claims=stumble, jobs=1).seed) == [0, 1, 2]
+    assert not list(runs.glob("*-1"))
+
+
+def test_a_worker_that_dies_is_retried_and_reported(tmp_path, runs, capsys):
+    """The study finishes, and says that a worker died."""
+    table = study.run_study(["fake"], range(4), tmp_path / "results.csv", claims=dying(runs), jobs=2)
+    assert sorted(table.seed) == [0, 1, 2, 3] and (table.seed == table.value).all()
+    assert "a worker died" in capsys.readouterr().err
+
+
+def test_workers_that_keep_dying_end_the_study(tmp_path, runs):
+    """It gives up naming the seeds, and keeps what was done."""
+    path = tmp_path / "results.csv"
+    study.run_study(["fake"], [0], path, claims=dying(runs), jobs=2)
+    with pytest.raises(RuntimeError, match=r"3 times in a row over the seeds \[1\]"):
+        study.run_study(["fake"], [0, 1], path, claims=dying(runs, always=True), jobs=2)
+    assert study.read_table(path).seed.tolist() == [0]
+
+
+def test_a_dask_cluster_gives_the_same_numbers(tmp_path):
+    """Naming a scheduler moves the work there and changes nothing else."""
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+    tables = []
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        for name, scheduler in (("here", None), ("there", cluster.scheduler_address)):
+            tables.append(study.run_study(["subgoals"], range(3), tmp_path / name, scheduler, jobs=1))
+    here, there = (table.sort_values(["seed", "number"]).reset_index(drop=True) for table in tables)
+    pd.testing.assert_frame_equal(here, there)
+
+
+def test_one_experiment_serves_its_claims_once(runs):
+    """Two claims of one experiment share its result."""
+    fake = counting(runs)["fake"]
+    _, rows, failures = study.work(7, ["a", "b"], {"a": fake, "b": replace(fake, id="b")})
+    assert [row[0] for row in rows] == ["a", "b"] and not failures and len(list(runs.iterdir())) == 1
+
+
+def test_the_command_writes_table_and_claims(tmp_path, capsys):
+    """From the command line to results.csv and claims.json; a second call adds nothing."""
+    arguments = ["study", "subgoals", "--seeds", "4", "--folder", str(tmp_path / "s")]
+    main(arguments)
+    table = (tmp_path / "s" / "results.csv").read_text()
+    (found,) = json.loads((tmp_path / "s" / "claims.json").read_text())
+    assert found["id"] == "subgoals" and found["seeds"] == 4
+    assert "subgoals" in capsys.readouterr().out
+    main(arguments)
+    assert (tmp_path / "s" / "results.csv").read_text() == table
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nonsense"], "no claim nonsense; known: centroid, prediction, velocity"),
+        (["subgoals", "--seeds", "1"], "an interval needs at least 2 seeds, got 1"),
+    ],
+)
+def test_bad_calls_end_with_a_message(arguments, message, tmp_path, monkeypatch):
+    """An unknown claim lists the known ones; nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as end:
+        main(["study", *arguments])
+    assert message in str(end.value) and list(tmp_path.iterdir()) == []
+
+
+def test_an_unwritable_folder_is_said_before_the_work(tmp_path, monkeypatch):
+    """A file in the folder's place ends the call before any experiment."""
+    (tmp_path / "taken").write_text("")
+    monkeypatch.setattr(study, "run_study", lambda *_: pytest.fail("work was begun"))
+    with pytest.raises(SystemExit) as end:
+        main(["study", "subgoals", "--folder", str(tmp_path / "taken")])
+    assert "cannot be written to" in str(end.value)
+
+
+@pytest.mark.parametrize("content", ["", "a,b\n1,2\n", "claim,seed,number,value\nx,one,y,2\n"])
+def test_a_table_of_something_else_is_refused(content, tmp_path):
+    """A file that holds no results is named, not overwritten."""
+    path = tmp_path / "results.csv"
+    path.write_text(content)
+    with pytest.raises(FormatError, match=r"results\.csv"):
+        study.run_study(["fake"], range(2), path)
+    assert path.read_text() == content
+
+
+def test_intervals_cover_the_truth():
+    """Of 1000 intervals of twenty values 93 to 98 % hold the true mean, for numbers and for shares."""
+    rng = np.random.default_rng(0)
+    for drawn, truth, share in (
+        (rng.normal(3.0, 1.0, (1000, 20)), 3.0, False),
+        (rng.random((1000, 20)) < 0.3, 0.3, True),
+    ):
+        ends = [study.interval(values, share)[1:] for values in drawn]
+        assert 0.93 < np.mean([low <= truth <= high for low, high in ends]) < 0.98
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        (("yes", "yes"), "holds"),
+        (("yes", "no"), "holds in part"),
+        (("yes", "open"), "holds in part"),
+        (("open",), "holds in part"),
+        (("open", "no"), "does not hold"),
+        (("no",), "does not hold"),
+    ],
+)
+def test_the_verdict_follows_the_rule(answers, words):
+    """All criteria met; some, or none and none clearly not; none, and one clearly not."""
+    assert study.verdict(answers) == words
+
+
+def test_a_criterion_is_met_only_by_the_whole_interval():
+    """A mean above zero whose interval reaches below it leaves it open; no number at all does too."""
+    criterion = Criterion("number", "a number", (0, np.inf), (0, 1))
+    for values, answer in (
+        ([1.0, 1.1, 0.9], "yes"),
+        ([1.0, -0.8, 0.5], "open"),
+        ([-1.0, -1.1, -0.9], "no"),
+        ([], "open"),
+    ):
+        assert study.measured(criterion, np.array(values))["met"] == answer
+    assert study.measured(criterion, np.zeros(5))["met"] == "no"
+    assert study.measured(criterion, np.array([]))["mean"] is None
+
+
+def test_only_what_stands_between_the_marks_is_replaced():
+    """The report's own words stay; a report without marks is refused."""
+    text = f"before\n{study.BEGIN}\nold\n{study.END}\nafter\n"
+    assert study.put_between_marks(text, "new") == text.replace("old", "new")
+    with pytest.raises(ValueError, match="once each"):
+        study.put_between_marks("no marks", "new")
+
+
+# ---- the experiments' own measures
+
+
+def test_windings_count_turns():
+    """Twice round counter-clockwise is +2, a point outside is 0, and clockwise is negative."""
+    turn = np.linspace(0, 4 * np.pi, 100, endpoint=False)
+    path = np.column_stack([np.cos(turn), np.sin(turn)])
+    assert claims.windings(path, [[0.2, 0.1], [3, 0]]).tolist() == [2, 0]
+    assert claims.windings(path[::-1], [[0.2, 0.1]]).tolist() == [-2]
+
+
+def test_predictions_of_a_straight_walk_are_right():
+    """A walker at constant velocity is predicted through a gap, and one who is taken to stand is not."""
+    t = np.arange(0, 6, 0.1)
+    truth = np.column_stack([1.0 * t, 0.5 * t])
+    shown = truth.copy()
+    shown[40:55] = np.nan
+    for motion in (claims.VELOCITY, claims.ACCELERATION):
+        assert np.abs(claims.causal_estimates(t, shown, motion) - truth)[40:55].max() < 0.05
+    standing = claims.causal_estimates(t, shown, claims.VELOCITY, claims.standing_still)
+    assert np.allclose(standing[40:55], standing[40])
+
+
+def test_hiding_takes_away_one_second_in_four():
+    """Only what was visible is counted as hidden, and it is not shown."""
+    t, places = np.arange(0, 20, 0.1), np.ones((200, 2))
+    occluded = t < 5
+    user = type("Track", (), {"t": t, "measurements": places, "occluded": occluded})
+    shown, hidden = claims.now_and_then(user)
+    assert np.isnan(shown[hidden]).all() and not (hidden & occluded).any()
+    assert 30 <= hidden.sum() <= 42
+
+
+@pytest.mark.parametrize("matching", ["greedy", "joint"])
+def test_walkers_far_apart_are_never_switched(matching):
+    """Two walkers on parallel lines keep their tracks; swapped by hand halfway, each counts one switch."""
+    t = np.arange(0, 6.05, 0.1)
+    objects = [np.array([[x, 0.0], [x, 4.0]]) for x in t]
+    alone = np.tile([0, 1], (len(t), 1))
+    assert claims.switches(t, objects, alone, matching) == 0
+    alone[30:] = [1, 0]
+    assert claims.switches(t, objects, alone, matching) == pytest.approx(10.0)
+
+
+def test_walkers_that_coincide_are_one_centroid():
+    """There are as many centroids as groups, and a walker alone has the index of its own."""
+    t, objects, alone = claims.crossing_walkers(12, np.random.default_rng(3))
+    assert len(t) == len(objects) == len(alone)
+    assert any(len(each) < 12 for each in objects)
+    for centroids, names in zip(objects, alone, strict=True):
+        own = names[names >= 0]
+        assert len(own) == len(set(own)) and len(centroids) <= 12 - (12 - len(own)) // 2
