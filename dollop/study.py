@@ -26,13 +26,16 @@ SEEDS, QUICK_SEEDS = 100, 3
 ATTEMPTS = 3
 """How often in a row workers may die without a seed being finished before the study gives up."""
 
+PATIENCE = 300.0
+"""On a cluster, after so many s without a seed finished a worker counts as dead: joblib's Dask backend is silent."""
+
 BEGIN, END = "<!-- claims: begin -->", "<!-- claims: end -->"
 
 
 # ---- running
 
 
-def work(seed, ids, claims=None):
+def work(seed, ids, claims=CLAIMS):
     """Every experiment of some claims for one seed; one experiment may serve several claims.
 
     Parameters
@@ -51,7 +54,7 @@ def work(seed, ids, claims=None):
     failures : list of str
         What went wrong, by claim; the others go on.
     """
-    claims, found, rows, failures = claims or CLAIMS, {}, [], []
+    found, rows, failures = {}, [], []
     for id in ids:
         claim = claims[id]
         try:
@@ -65,7 +68,7 @@ def work(seed, ids, claims=None):
     return seed, rows, failures
 
 
-def run_study(ids, seeds, table_path, scheduler=None, claims=None, jobs=-1):
+def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
     """Fill the table with what is missing in it, seed by seed.
 
     Parameters
@@ -93,12 +96,12 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=None, jobs=-1):
         If experiments failed, or workers kept dying; all that was finished is in the table.
     """
     table, failures, deaths = read_table(table_path), [], 0
-    todo = missing(table, ids, seeds)
+    todo = missing(table, claims, ids, seeds)
     with tqdm(total=len(todo), desc="study", unit="seed", file=sys.stderr) as bar, workers(scheduler, jobs) as done:
         while todo:
             try:
                 for seed, rows, failed in done([joblib.delayed(work)(*job, claims) for job in todo.items()]):
-                    table = pd.concat([table, as_table(rows)], ignore_index=True)
+                    table = pd.concat([table, as_table(rows)]).drop_duplicates(COLUMNS[:3], keep="last")
                     write_table(table, table_path)
                     failures += failed
                     deaths = 0
@@ -122,7 +125,8 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=None, jobs=-1):
 def workers(scheduler=None, jobs=-1):
     """What runs jobs and yields their results as they come: processes here, or those of a Dask cluster."""
     with dask_backend(scheduler) if scheduler else nullcontext():
-        yield lambda delayed: joblib.Parallel(jobs, return_as="generator_unordered", batch_size=1)(delayed)
+        patience = PATIENCE if scheduler else None
+        yield joblib.Parallel(jobs, return_as="generator_unordered", batch_size=1, timeout=patience)
 
 
 @contextmanager
@@ -138,13 +142,16 @@ def dask_backend(scheduler):
 
 def a_worker_died(error):
     """Whether it is the worker that failed, not the experiment."""
-    return any(kind.__name__ in ("BrokenProcessPool", "KilledWorker") for kind in type(error).__mro__)
+    return any(kind.__name__ in ("BrokenProcessPool", "KilledWorker", "TimeoutError") for kind in type(error).__mro__)
 
 
-def missing(table, ids, seeds):
-    """The claims that each seed still lacks, {seed: list of ids}, in the order given."""
-    done = set(zip(table.claim, table.seed, strict=True))
-    lacking = {seed: [id for id in ids if (id, seed) not in done] for seed in seeds}
+def missing(table, claims, ids, seeds):
+    """The claims that each seed still lacks a number of, {seed: list of ids}, in the order given."""
+    done = set(zip(table.claim, table.seed, table.number, strict=True))
+    lacking = {
+        seed: [id for id in ids if any((id, seed, each.number) not in done for each in claims[id].criteria)]
+        for seed in seeds
+    }
     return {seed: ids for seed, ids in lacking.items() if ids}
 
 
@@ -187,8 +194,8 @@ def interval(values, share=False, level=0.95):
     Examples
     --------
     >>> mean, low, high = interval([0, 1, 1, 1, 1, 1, 1, 1, 1, 1], share=True)
-    >>> round(mean, 2), round(low, 2), round(high, 2)
-    (0.9, 0.6, 0.98)
+    >>> f"{mean:.2f} [{low:.2f}, {high:.2f}]"
+    '0.90 [0.60, 0.98]'
     """
     values = np.asarray(values, float)
     if not len(values):
@@ -262,10 +269,9 @@ def verdict(answers):
     return "does not hold" if "no" in answers and "yes" not in answers else "holds in part"
 
 
-def summaries(table, claims=None):
+def summaries(table):
     """Summaries of all claims in the table, in the paper's order."""
-    claims = claims or CLAIMS
-    return [summary(claim, table[table.claim == id]) for id, claim in claims.items() if (table.claim == id).any()]
+    return [summary(claim, table[table.claim == id]) for id, claim in CLAIMS.items() if (table.claim == id).any()]
 
 
 def claims_table(found):
@@ -333,6 +339,8 @@ def command(options):
         table = run_study(options.ids or list(CLAIMS), range(seeds), folder / "results.csv", options.scheduler)
     except RuntimeError as error:
         raise ValueError(f"{error}. Run the same command again to go on") from error
+    except KeyboardInterrupt:
+        sys.exit(f"dollop: stopped; what was done is in {folder / 'results.csv'}, the same command goes on from there")
     found = summaries(table)
     report(found, folder)
 

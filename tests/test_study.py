@@ -31,11 +31,12 @@ def counting(folder):
 
 
 def dying(folder, always=False):
-    """An experiment whose worker dies at seed 1, the first time or always."""
+    """An experiment whose worker dies at seed 1, the first time or always; never the process of the test."""
+    here = os.getpid()
 
     def experiment(seed):
         marker = folder / "died"
-        if seed == 1 and (always or not marker.exists()):
+        if seed == 1 and os.getpid() != here and (always or not marker.exists()):
             marker.touch()
             os._exit(1)
         return {"number": float(seed)}
@@ -71,6 +72,16 @@ def test_a_study_goes_on_where_it_was(tmp_path, runs):
     assert sorted(path.name for path in runs.iterdir()) == ["0-0", "1-0", "2-0", "3-0"]
     assert sorted(both.seed) == [0, 1, 2, 3]
     assert both[both.seed < 2].sort_values("seed").value.tolist() == first.sort_values("seed").value.tolist()
+
+
+def test_a_number_that_is_new_is_filled_in(tmp_path, runs):
+    """A claim that has got another criterion is run again for it, and no number stands twice in the table."""
+    claim = counting(runs)["fake"]
+    study.run_study(["fake"], [0], tmp_path / "results.csv", claims={"fake": claim}, jobs=1)
+    more = replace(claim, criteria=(*claim.criteria, replace(claim.criteria[0], number="other")))
+    more = replace(more, experiment=lambda seed: {"number": 1.0, "other": 2.0})
+    table = study.run_study(["fake"], [0], tmp_path / "results.csv", claims={"fake": more}, jobs=1)
+    assert dict(zip(table.number, table.value, strict=True)) == {"number": 1.0, "other": 2.0}
 
 
 def test_an_interrupted_study_loses_nothing(tmp_path, runs, monkeypatch):
@@ -128,6 +139,21 @@ def test_a_dask_cluster_gives_the_same_numbers(tmp_path):
             tables.append(study.run_study(["subgoals"], range(3), tmp_path / name, scheduler, jobs=1))
     here, there = (table.sort_values(["seed", "number"]).reset_index(drop=True) for table in tables)
     pd.testing.assert_frame_equal(here, there)
+
+
+def test_a_dask_worker_that_dies_for_good_ends_the_study(tmp_path, runs, monkeypatch, capsys):
+    """The study does not wait for ever for what a cluster has given up; the other seeds are kept."""
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+    monkeypatch.setattr(study, "PATIENCE", 3.0)
+    monkeypatch.setattr(study, "ATTEMPTS", 1)
+    path = tmp_path / "results.csv"
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        pytest.raises(RuntimeError, match="workers died"),
+    ):
+        study.run_study(["fake"], range(4), path, cluster.scheduler_address, dying(runs, always=True))
+    assert 1 not in study.read_table(path).seed.tolist()
+    assert "a worker died" in capsys.readouterr().err
 
 
 def test_one_experiment_serves_its_claims_once(runs):
