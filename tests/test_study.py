@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dollop import claims, study
+from dollop import study, trials
 from dollop.claims import Claim, Criterion
 from dollop.cli import main
 from dollop.files import FormatError
@@ -265,8 +265,8 @@ def test_windings_count_turns():
     """Twice round counter-clockwise is +2, a point outside is 0, and clockwise is negative."""
     turn = np.linspace(0, 4 * np.pi, 100, endpoint=False)
     path = np.column_stack([np.cos(turn), np.sin(turn)])
-    assert claims.windings(path, [[0.2, 0.1], [3, 0]]).tolist() == [2, 0]
-    assert claims.windings(path[::-1], [[0.2, 0.1]]).tolist() == [-2]
+    assert trials.windings(path, [[0.2, 0.1], [3, 0]]).tolist() == [2, 0]
+    assert trials.windings(path[::-1], [[0.2, 0.1]]).tolist() == [-2]
 
 
 def test_predictions_of_a_straight_walk_are_right():
@@ -275,9 +275,9 @@ def test_predictions_of_a_straight_walk_are_right():
     truth = np.column_stack([1.0 * t, 0.5 * t])
     shown = truth.copy()
     shown[40:55] = np.nan
-    for motion in (claims.VELOCITY, claims.ACCELERATION):
-        assert np.abs(claims.causal_estimates(t, shown, motion) - truth)[40:55].max() < 0.05
-    standing = claims.causal_estimates(t, shown, claims.VELOCITY, claims.standing_still)
+    for motion in (trials.VELOCITY, trials.ACCELERATION):
+        assert np.abs(trials.causal_estimates(t, shown, motion) - truth)[40:55].max() < 0.05
+    standing = trials.causal_estimates(t, shown, trials.VELOCITY, trials.standing_still)
     assert np.allclose(standing[40:55], standing[40])
 
 
@@ -286,7 +286,7 @@ def test_hiding_takes_away_one_second_in_four():
     t, places = np.arange(0, 20, 0.1), np.ones((200, 2))
     occluded = t < 5
     user = type("Track", (), {"t": t, "measurements": places, "occluded": occluded})
-    shown, hidden = claims.now_and_then(user)
+    shown, hidden = trials.now_and_then(user)
     assert np.isnan(shown[hidden]).all() and not (hidden & occluded).any()
     assert 30 <= hidden.sum() <= 42
 
@@ -297,14 +297,14 @@ def test_walkers_far_apart_are_never_switched(matching):
     t = np.arange(0, 6.05, 0.1)
     objects = [np.array([[x, 0.0], [x, 4.0]]) for x in t]
     alone = np.tile([0, 1], (len(t), 1))
-    assert claims.switches(t, objects, alone, matching) == 0
+    assert trials.switches(t, objects, alone, matching) == 0
     alone[30:] = [1, 0]
-    assert claims.switches(t, objects, alone, matching) == pytest.approx(10.0)
+    assert trials.switches(t, objects, alone, matching) == pytest.approx(10.0)
 
 
 def test_walkers_that_coincide_are_one_centroid():
     """There are as many centroids as groups, and a walker alone has the index of its own."""
-    t, objects, alone = claims.crossing_walkers(12, np.random.default_rng(3))
+    t, objects, alone = trials.crossing_walkers(12, np.random.default_rng(3))
     assert len(t) == len(objects) == len(alone)
     assert any(len(each) < 12 for each in objects)
     for centroids, names in zip(objects, alone, strict=True):
