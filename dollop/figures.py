@@ -81,8 +81,11 @@ def main(arguments=None):
     written = options.folder / "metrics.json"
     metrics = json.loads(written.read_text()) if written.exists() else {}
     panels = options.ids or list(FIGURES)
-    for panel in tqdm(panels, desc="figures", unit="panel", file=sys.stderr):
-        metrics[panel] = make(panel, options.folder)
+    try:
+        for panel in tqdm(panels, desc="figures", unit="panel", file=sys.stderr):
+            metrics[panel] = make(panel, options.folder)
+    except ImportError as error:
+        sys.exit(f"figures: {error}")
     metrics = {panel: metrics[panel] for panel in FIGURES if panel in metrics}
     with whole_file(written, "w") as stream:
         json.dump(metrics, stream, indent=1)

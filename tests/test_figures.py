@@ -1,6 +1,7 @@
 """The figure script: fresh numbers agree with the committed ones, and bad calls end with a message."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,10 @@ def test_every_panel_is_committed():
 def test_fresh_numbers_equal_the_committed_ones(panel, tmp_path):
     """Simulated anew from the seed, a panel's numbers are those of metrics.json."""
     pytest.importorskip("pybullet")
-    assert figures.make(panel, tmp_path) == pytest.approx(COMMITTED[panel], rel=0.02)
+    fresh, committed = figures.make(panel, tmp_path), COMMITTED[panel]
+    assert fresh.keys() == committed.keys()
+    for key, value in committed.items():
+        assert fresh[key] == pytest.approx(value, rel=0.02), key
     assert (tmp_path / figures.name_of(panel)).exists()
 
 
@@ -75,6 +79,16 @@ def test_unknown_figures_are_named_with_the_known_ones(capsys):
     with pytest.raises(SystemExit):
         figures.main(["99"])
     assert "no figure 99; known: 1, 2" in capsys.readouterr().err
+
+
+def test_without_pybullet_the_figures_say_how_to_get_it(tmp_path, monkeypatch):
+    """The message names the extra to install; there is no traceback, and nothing is half-written."""
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    monkeypatch.delitem(sys.modules, "dollop.lab.world", raising=False)
+    monkeypatch.delitem(sys.modules, "dollop.lab.render", raising=False)
+    with pytest.raises(SystemExit, match=r"pip install .dollop\[lab\]"):
+        figures.main(["1", "--folder", str(tmp_path)])
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_that_cannot_be_made_is_said_before_the_work(tmp_path, capsys):
