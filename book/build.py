@@ -86,7 +86,7 @@ def still(states, buffers, root):
     settings = html.escape(", ".join(filter(None, (setting(states[part]) for part in parts))))
     pictures = [buffers[part]["value",]["data"].strip() for part in parts if ("value",) in buffers.get(part, {})]
     images = "".join(f'<img alt="{settings}" src="data:image/png;base64,{picture}">' for picture in pictures)
-    return f'<p class="still">In the live notebook, sliders move this. Here: {settings}.</p>{images}'
+    return f'<p class="still">In the live notebook, controls move this. Here: {settings}.</p>{images}'
 
 
 def descendants(states, name):
@@ -97,15 +97,13 @@ def descendants(states, name):
 
 
 def setting(state):
-    """What a control is called and where it stands; nothing for other widgets.
+    """What a control is called and where it stands; nothing for widgets that stand nowhere, such as buttons.
 
     >>> setting({"description": "x [m]", "value": 1.3})
     'x [m] = 1.3'
     """
-    if not state.get("description"):
-        return None
-    value = state["_options_labels"][state["index"]] if "_options_labels" in state else state["value"]
-    return f"{state['description']} = {value}"
+    value = state["_options_labels"][state["index"]] if "_options_labels" in state else state.get("value")
+    return f"{state['description']} = {value}" if state.get("description") and value is not None else None
 
 
 if __name__ == "__main__":

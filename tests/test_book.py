@@ -32,8 +32,9 @@ def test_everything_inside_a_widget_is_found_in_order():
 
 
 def test_what_is_no_control_has_no_setting():
-    """A picture or a box is not named among the settings."""
+    """A picture, a box or a button is not named among the settings."""
     assert build.setting(STATES["image"]) is None
+    assert build.setting({"description": "kidnap the robot"}) is None
     assert build.setting({"description": "x [m]", "value": 1.3}) == "x [m] = 1.3"
 
 
