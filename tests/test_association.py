@@ -46,7 +46,7 @@ def test_relocation_is_the_formula():
     np.testing.assert_allclose(association.relocate(after, _matching(indices)), expected)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(lengths, lengths, st.integers(1, 12), st.booleans())
 def test_subgoals_move_with_the_layout(dx, dy, m, turned):
     """All objects shifted: all subgoals shifted by the same, for any number of corners."""
@@ -93,7 +93,7 @@ def test_turned_relocation_turns_the_differences(quarters):
     assert np.abs(association.relocate(after, _matching(indices)) @ (1, 1j) - expected).max() > 0.5
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(-3.1, 3.1), lengths, lengths)
 def test_the_turn_of_a_turned_layout_is_found(angle, dx, dy):
     """Points turned by an angle and shifted: layout_turn gives the angle."""
@@ -132,7 +132,7 @@ def _turned_frames(frames, angle, shift):
     return Frames(np.c_[z.real, z.imag], frames.directions + angle)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.floats(-3, 3), lengths)
 def test_frames_take_the_subgoals_with_them(seed, angle, shift):
     """All frames turned and shifted together: so are the subgoals of one demonstration."""

@@ -292,7 +292,7 @@ any_demonstrations = st.lists(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(any_demonstrations, st.sampled_from([0.01, 0.15, 2.0]))
 def test_any_demonstrations_give_a_proper_acyclic_model(sequences, spread):
     """Rows and their ends sum to one, edges lead upwards, covariances are positive, the path leads through."""
@@ -307,7 +307,7 @@ def test_any_demonstrations_give_a_proper_acyclic_model(sequences, spread):
     assert all(model.transitions[u, v] > 0 for u, v in pairwise(path))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(any_demonstrations)
 def test_any_demonstration_passes_its_states_in_order(sequences):
     """A demonstration visits no state twice, and means are the means of what was merged into them."""

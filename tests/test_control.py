@@ -66,7 +66,7 @@ def test_remaining_falls_along_the_direction(seed, x, y):
     assert guidance.remaining(0, x + step * ux, y + step * uy) < here or here < 1e-6
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seeds, st.tuples(st.floats(-20, 20), st.floats(-20, 20)))
 def test_no_start_and_no_sequence_makes_the_response_diverge(seed, start):
     """Whatever was fitted and wherever it starts, the response stays within the bound of its Lyapunov functions."""

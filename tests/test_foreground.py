@@ -84,7 +84,7 @@ def test_surfaces_are_filled_between_neighbouring_beams_only():
     assert ((filled[:, 0] > 5.4) & (filled[:, 0] < 5.6)).sum() >= 3
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.floats(0.05, 1.0), st.lists(st.booleans(), min_size=1, max_size=12))
 def test_grid_follows_the_autoregression(gain, seen):
     """A cell's value is g <- (1 - gain) g + gain hit, written out."""
@@ -131,7 +131,6 @@ def test_seen_free_knows_beam_range_and_field_of_view():
 cells = st.sets(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=40)
 
 
-@settings(deadline=None)
 @given(cells)
 def test_blobs_are_the_connected_components(occupied):
     """Blobs equal those of a plain flood fill over eight neighbours, small ones left out."""

@@ -102,7 +102,7 @@ GRIDS = hnp.arrays(
 ORIGINS = st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(GRIDS, ORIGINS, st.sampled_from([0.05, 0.1, 0.025]), st.sampled_from([".map", ".yaml"]))
 def test_save_load_round_trip(occupancy, origin, resolution, suffix):
     """Occupied, free and unknown cells come back as they were, probabilities to the format's precision."""
@@ -117,7 +117,6 @@ def test_save_load_round_trip(occupancy, origin, resolution, suffix):
         np.testing.assert_array_equal(other.occupied, grid.occupied)
 
 
-@settings(deadline=None)
 @given(GRIDS)
 def test_distance_field_is_brute_force(occupancy):
     """The distance field is the smallest distance between cell centres, and inf where nothing is occupied."""
@@ -247,7 +246,7 @@ def test_maps_by_suffix(tmp_path):
         OccupancyGrid.load(tmp_path / "a.yaml")
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     name=st.sampled_from(["a.map", "a.yaml", "a.pgm"]),
     edits=st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 2), st.binary(max_size=6)), min_size=1, max_size=4),

@@ -146,7 +146,7 @@ def test_the_same_seed_walks_the_same_walk():
     assert not np.allclose(one.positions[:200], other.positions[:200])
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**16), sides=st.lists(st.sampled_from([-1, 1]), min_size=4, max_size=4))
 def test_a_slalom_passes_every_cone_on_its_side(seed, sides):
     """Where the walker is abreast of a cone it is on the side asked for, and clear of it."""

@@ -320,7 +320,7 @@ def test_speeds_are_those_walked():
     assert np.allclose(fast.speeds, 2 * slow.speeds)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), st.sampled_from([0.3, 0.05, 0.01, 1e-4]))
 def test_response_arrives_from_anywhere(law, start, reach):
     """Kidnapped anywhere, the response passes within reach of every subgoal in order and ends at the last."""
@@ -440,7 +440,7 @@ def test_bad_subgoals_and_starts(law):
         law.response(reach=0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(any_walks, st.booleans())
 def test_any_walks_can_be_fitted(walks, retimed):
     """However wild the walks, the fit yields stable segments that lead from the mean start to the mean end."""

@@ -26,7 +26,7 @@ def _moved(environment, shift):
     return Environment(environment.boxes + np.tile(shift, 2))
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(seeds)
 def test_eight_corners_are_matched_as_the_best_of_all_permutations(seed):
     """Literal: cost and margin equal those from the 40,320 permutations of eight corners, one by one."""
@@ -55,7 +55,7 @@ def _cost_by_the_formula(x, y, pairs, left_out=3.0, moved=0.4, kappa=1.0, turned
     return -np.logaddexp(-still, -turn) - np.logaddexp(-stay, -shifted) + price + nothing
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seeds, st.sampled_from(["none", "missing", "added"]))
 def test_the_robust_matching_is_the_best_of_all_partial_ones(seed, change):
     """Robust: cost and margin equal those of the formula tried on every partial matching of three objects."""
@@ -73,7 +73,7 @@ def test_the_robust_matching_is_the_best_of_all_partial_ones(seed, change):
 
 
 @methods
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds, shifts)
 def test_translation_changes_nothing(method, seed, shift):
     """One environment may lie elsewhere: the same corners are matched, at the cost of the shift, at most 6 nats."""
@@ -87,7 +87,7 @@ def test_translation_changes_nothing(method, seed, shift):
         assert abs(other.cost - one.cost) <= 6 + 1e-6
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds, shifts)
 def test_another_origin_changes_nothing_where_an_object_is_missing(seed, shift):
     """Robust, a can missing: environments that lie elsewhere together match the same."""
@@ -98,7 +98,7 @@ def test_another_origin_changes_nothing_where_an_object_is_missing(seed, shift):
 
 
 @methods
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds, st.permutations(range(3)), st.permutations(range(3)))
 def test_the_order_of_the_objects_changes_nothing(method, seed, order_i, order_j):
     """Objects in another order: the same corners are matched, only their numbers are others."""
@@ -111,7 +111,7 @@ def test_the_order_of_the_objects_changes_nothing(method, seed, order_i, order_j
         np.testing.assert_array_equal(corners_j.ravel()[other.indices], one.indices[corners_i.ravel()])
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds, st.sampled_from(["none", "missing", "added"]))
 def test_matching_back_is_the_inverse(seed, change):
     """Robust: from j to i the same pairs are found as from i to j, at the same cost and margin."""

@@ -38,7 +38,7 @@ def windings(path, boxes):
     return np.round(turns)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.floats(-3, 3), st.floats(-3, 3))
 def test_objects_that_move_together_take_the_task_along(dx, dy):
     """All boxes shifted by the same: start, subgoals and response are shifted by it (Sec. IV-B)."""

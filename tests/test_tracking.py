@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from filterpy.common import Q_continuous_white_noise
 from filterpy.kalman import KalmanFilter, rts_smoother
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dollop.tracking import (
@@ -96,7 +96,6 @@ costs = st.integers(0, 5).flatmap(
 )
 
 
-@settings(deadline=None)
 @given(costs)
 def test_joint_matching_is_the_cheapest_of_all(cost):
     """The Hungarian matching equals the best over all permutations, unmatched tracks at the price of the gate."""
@@ -108,7 +107,6 @@ def test_joint_matching_is_the_cheapest_of_all(cost):
     assert cost[tracks, objects].sum() + 4.0 * (k - len(tracks)) == pytest.approx(best)
 
 
-@settings(deadline=None)
 @given(costs)
 def test_greedy_matching_takes_the_nearest_pair_and_stays_one_to_one(cost):
     """No track or object is used twice, the nearest pair is in, and none left over is within the gate."""

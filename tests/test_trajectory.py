@@ -209,7 +209,7 @@ def test_laps_have_an_even_clock():
     assert [len(lap) for lap in gappy] == pytest.approx([len(lap) for lap in whole], rel=0.05)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(-5, 5), st.floats(-50, 50), st.floats(-50, 50))
 def test_laps_do_not_depend_on_where_the_lab_lies(angle, x, y):
     """Turning and shifting the track turns and shifts its laps."""
