@@ -6,7 +6,9 @@ python -m benchmarks lds
 import numpy as np
 
 from benchmarks.timing import row, seconds
-from dollop.lds import DECAY, HORIZON, LDS, STEPS, SequencedLDS, Statistics, fewest_segments
+from dollop.lds import DECAY, LDS, STEPS, Statistics
+from dollop.segmentation import HORIZON, fewest_segments
+from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import align, distance_to_polyline, retime
 
 SAMPLES, CANDIDATES = 200, 100

@@ -31,10 +31,11 @@ from dollop.execution import Run, Unicycle, perform
 from dollop.files import FormatError
 from dollop.gridmap import OccupancyGrid
 from dollop.laser import LaserLog
-from dollop.lds import LDS, SequencedLDS
+from dollop.lds import LDS
 from dollop.logs import read_log, write_log
 from dollop.matching import Matching, match
 from dollop.observation import Observation, observe
+from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
 from dollop.tracking import Motion, Track, Tracker
 from dollop.trajectory import laps

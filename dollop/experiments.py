@@ -7,9 +7,9 @@ import numpy as np
 from dollop.avoidance import ObstacleMap
 from dollop.execution import free_poses, perform
 from dollop.gridmap import OccupancyGrid
-from dollop.lds import SequencedLDS
 from dollop.matching import match
 from dollop.observation import observe
+from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
 from dollop.trajectory import laps
 

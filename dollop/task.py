@@ -11,8 +11,9 @@ from dollop.association import Association, Frames, associate, associate_with_fr
 from dollop.cdhmm import SubgoalHMM
 from dollop.environment import Environment
 from dollop.files import FormatError, read_bytes, whole_file
-from dollop.lds import LDS, SequencedLDS, Statistics
+from dollop.lds import LDS, Statistics
 from dollop.matching import Matching, match
+from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import laps
 
 FORMAT, VERSION = "dollop task", 1

@@ -17,9 +17,10 @@ from dollop.foreground import near_together, seen_free
 from dollop.lab.person import slalom, smooth_path
 from dollop.lab.scenes import figure_eight_scene, rearranged, slalom_scene
 from dollop.layouts import random_layouts, right_indices
-from dollop.lds import LDS, SequencedLDS
+from dollop.lds import LDS
 from dollop.matching import match
 from dollop.observation import observe
+from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn, members_along
 from dollop.tracking import (
     Motion,

@@ -6,7 +6,7 @@ import numpy as np
 
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
-from dollop.lds import SequencedLDS
+from dollop.sequenced_lds import SequencedLDS
 
 WIDTH, DEPTH, SIDE = 9.0, 7.0, 0.05
 FURNITURE = np.array([[0.0, 5.0, 0.6, 6.2], [2.0, 6.3, 4.0, 7.0], [6.8, 0.0, 8.4, 0.7], [8.5, 4.2, 9.0, 5.0]])

@@ -8,7 +8,8 @@ from rooms import figure_eight_task
 
 from dollop.control import CONTROL_LAWS, PIONEER_LIMITS, REACH, STEP, Guidance, Limits, bend_speeds, clip, wrap
 from dollop.execution import Unicycle
-from dollop.lds import LDS, SequencedLDS
+from dollop.lds import LDS
+from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import distance_to_polyline
 
 seeds = st.integers(0, 2**32 - 1)

@@ -15,7 +15,7 @@ from dollop.gridmap import OccupancyGrid
 from dollop.lab.robot import LocalisedPioneer
 from dollop.lab.scenes import BACKGROUND, BEAM_HEIGHT, ROOM, figure_eight_scene
 from dollop.lab.world import World
-from dollop.lds import SequencedLDS
+from dollop.sequenced_lds import SequencedLDS
 
 START = (4.5, 3.6, -0.7)
 

@@ -1,0 +1,201 @@
+"""Where to cut a trajectory into segments of one LDS each (Sec. III): exact, by dynamic programming.
+
+An LDS is fitted to every possible segment, and what is compared with the trajectory is its whole response: the error of
+single steps is tiny for any finely sampled path. The companion work that the paper cites for the segmentation could not
+be found: criterion, search and the meaning of the tolerance are reconstructions.
+
+Symbols: C candidate cuts, d = 2 dimensions, K trajectories; G0 and G1 as in `dollop.lds`.
+"""
+
+import numpy as np
+
+from dollop.lds import DECAY, NOTHING, STEPS, Statistics, dot, powers_on
+from dollop.trajectory import remaining_share
+
+HORIZON, SETTLED = 48, 4.0  # the search follows a response over this many points, this many time constants
+
+
+def retimed_statistics(aligned):
+    """The function (start, length) -> Statistics of re-timed segments, summed over the walks.
+
+    `aligned` (K, 2 C - 1, d) has a sample at each of the C candidate cuts and one between; start (...) counts cuts, and
+    all segments of one call have the same length, because then they also share the places at which they are sampled.
+    """
+
+    def statistics(start, length):
+        at = 2 * length * (1 - remaining_share(STEPS, DECAY))
+        low = np.minimum(at.astype(int), 2 * length - 1)
+        rows = 2 * np.asarray(start)[..., None] + low
+        before, after = aligned.take(rows, axis=1), aligned.take(rows + 1, axis=1)
+        each = Statistics.of(before + (at - low)[:, None] * (after - before))
+        return Statistics(each.G0.sum(axis=0), each.G1.sum(axis=0))
+
+    return statistics
+
+
+def raw_statistics(walks, moments):
+    """The function (start, length) -> Statistics of the samples as they are, from sums taken once along each walk.
+
+    `moments` (K, C) are the fractional sample numbers of the candidate cuts; start counts cuts, as does length.
+    """
+    cuts = moments.round().astype(int)
+    sums = [running_sums(walk - walk.mean(axis=0)) for walk in walks]
+
+    def statistics(start, length):
+        start = np.asarray(start)
+        parts = [shifted_sums(s, cut[start], cut[start + length]) for s, cut in zip(sums, cuts, strict=True)]
+        return sum(parts[1:], parts[0])
+
+    return statistics
+
+
+def running_sums(walk):
+    """The walk (N, d) and the sums of p[n], p[n] p[n]^T and p[n+1] p[n]^T over the n before each sample."""
+    now, after = walk[:-1], walk[1:]
+    terms = now, now[:, :, None] * now[:, None], after[:, :, None] * now[:, None]
+    return walk, *(np.concatenate([np.zeros((1, *term.shape[1:])), term.cumsum(axis=0)]) for term in terms)
+
+
+def shifted_sums(sums, start, end):
+    """Statistics of samples start to end (...) of a walk, shifted by the last: the products expanded."""
+    walk, first, now, after = sums
+    goal, count = walk[end], (end - start)[..., None, None]
+    total = first[end] - first[start]
+    later = total + walk[end] - walk[start]
+    square = count * outer(goal, goal)
+    G0 = now[end] - now[start] - outer(total, goal) - outer(goal, total) + square
+    G1 = after[end] - after[start] - outer(later, goal) - outer(goal, total) + square
+    moves = np.trace(G0, axis1=-2, axis2=-1) > 1e-10 * np.trace(now[-1])  # less is what rounding leaves of nothing
+    return Statistics(np.where(moves[..., None, None], G0, 0), np.where(moves[..., None, None], G1, 0))
+
+
+def outer(a, b):
+    return a[..., :, None] * b[..., None, :]
+
+
+def segment_errors(path, statistics):
+    """Total distance in m from the path to the response of every possible segment.
+
+    Parameters
+    ----------
+    path : (C, d) float array
+        The walks' mean at the candidate cuts.
+    statistics : callable
+        (start, length) -> Statistics.
+
+    Returns
+    -------
+    (C, C) float array
+        [i, j] for the segment from cut i to cut j, summed over the cuts between; `inf` where there is none between,
+        since such a segment would not be put to any test.
+    """
+    errors = np.full((len(path), len(path)), np.inf)
+    for length in range(2, len(path)):
+        start = np.arange(len(path) - length)
+        windows = path[start[:, None] + np.arange(length + 1)]
+        offsets = windows - windows[:, -1:]
+        responses = candidate_responses(statistics(start, length), offsets[:, 0])
+        errors[start, start + length] = distances(offsets[:, 1:-1], responses).sum(axis=1)
+    return errors
+
+
+def candidate_responses(statistics, x0):
+    """Responses (B, HORIZON + 2, d) from offsets x0 (B, d), up to the subgoal at 0.
+
+    Slow systems are shown by every m-th state, m such that the responses settle within the horizon.
+    """
+    decay = np.clip(np.median(statistics.decay), 0.5, 1 - 1e-6)
+    stride = max(1, int(-SETTLED / (HORIZON * np.log(decay))))
+    states = powers_on(np.linalg.matrix_power(statistics.matrix, stride), x0, HORIZON)
+    return np.concatenate([states, np.zeros_like(states[:, :1])], axis=1)
+
+
+def distances(points, polylines):
+    """Distances (B, T) of points (B, T, d) to polylines (B, V, d), to the two edges beside the nearest vertex.
+
+    That is what makes the search fast. Where a polyline comes closest between two vertices that are both farther away
+    than a third one, the distance is slightly too large, never too small.
+    """
+    count, d = polylines.shape[1:]
+    vertices = polylines.astype(np.float32)  # only to choose the nearest: |v|^2 - 2 v p
+    weights = np.concatenate([-2 * vertices, dot(vertices, vertices)[..., None]], axis=2)
+    lifted = np.ones((*points.shape[:2], d + 1), np.float32)
+    lifted[..., :d] = points
+    closest = (lifted @ np.ascontiguousarray(np.swapaxes(weights, 1, 2))).argmin(axis=2)
+    flat, row = polylines.reshape(-1, d), count * np.arange(len(points))[:, None]
+    edges = np.maximum(closest - 1, 0), np.minimum(closest, count - 2)
+    return np.minimum(*(distance_to_edge(points, *flat.take([row + e, row + e + 1], axis=0)) for e in edges))
+
+
+def distance_to_edge(points, tail, head):
+    """Distance (...) of points to the edges from tail to head, all (..., d)."""
+    offset, along = points - tail, head - tail
+    share = np.clip(dot(offset, along) / np.maximum(dot(along, along), NOTHING), 0, 1)
+    offset -= share[..., None] * along
+    return np.sqrt(dot(offset, offset))
+
+
+def fewest_segments(errors, tolerance):
+    """Cuts of the division with the fewest segments of mean error within tolerance, then the least total error.
+
+    Parameters
+    ----------
+    errors : (C, C) float array
+        From `segment_errors`, m.
+    tolerance : float
+        m.
+
+    Returns
+    -------
+    (K + 1,) int array
+        The cuts, the first 0 and the last C - 1.
+
+    Raises
+    ------
+    ValueError
+        No division keeps the tolerance; the message says which it could keep.
+    """
+    count = len(errors)
+    mean = errors / np.maximum(np.arange(count) - np.arange(count)[:, None], 1)
+    kept = np.where(mean <= tolerance, errors, np.inf)
+    cuts = divide(kept, lambda total, k: np.isfinite(total))
+    if cuts is None:
+        raise ValueError(
+            f"tolerance {tolerance} m cannot be kept with {count} candidate cuts, {least_tolerance(mean):.3g} m can; "
+            "a larger tolerance or more candidates would do"
+        )
+    return cuts
+
+
+def best_segments(errors, n_segments):
+    """Cuts (K + 1,) of the division into n_segments with the least total error; errors as in `fewest_segments`."""
+    return divide(errors, lambda total, k: k == n_segments)
+
+
+def divide(errors, enough):
+    """Dynamic programming over D[k][j] = min_i D[k-1][i] + errors[i][j], until enough(D[k][-1], k); None if never."""
+    total = np.where(np.arange(len(errors)) == 0, 0.0, np.inf)
+    before = []
+    for k in range(1, len(errors)):
+        sums = total[:, None] + errors
+        before.append(sums.argmin(axis=0))
+        total = sums.min(axis=0)
+        if enough(total[-1], k):
+            return trace_back(before)
+    return None
+
+
+def trace_back(before):
+    """The cuts (K + 1,) from the last one back, before[k][j] being the cut before cut j."""
+    cuts = [len(before[0]) - 1]
+    for choice in reversed(before):
+        cuts.append(choice[cuts[-1]])
+    return np.array(cuts[::-1])
+
+
+def least_tolerance(mean):
+    """The least tolerance that some division keeps, for mean errors (C, C)."""
+    worst = np.zeros(len(mean))
+    for j in range(1, len(mean)):
+        worst[j] = np.maximum(worst[:j], mean[:j, j]).min()
+    return worst[-1]

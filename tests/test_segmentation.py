@@ -1,0 +1,108 @@
+"""The search for subgoals: exact, and its fast statistics, responses and distances against plain ones."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from walks import walk_figure_eights
+
+from dollop.lds import LDS, Statistics
+from dollop.segmentation import (
+    best_segments,
+    candidate_responses,
+    distances,
+    fewest_segments,
+    raw_statistics,
+    retimed_statistics,
+    segment_errors,
+)
+from dollop.sequenced_lds import cut_moments
+from dollop.trajectory import align, distance_to_polyline, laps, retime
+
+
+@pytest.fixture(scope="module")
+def one_lap():
+    """A walked figure-eight of one lap (N, 2)."""
+    return walk_figure_eights(1, seed=0)[1]
+
+
+@pytest.fixture(scope="module")
+def five_laps():
+    """Five laps cut out of one track."""
+    return laps(*walk_figure_eights(6, seed=0))[:5]
+
+
+def search_input(walks, candidates, retimed=True):
+    """The path and the statistics of segments that the search sees."""
+    aligned, shares = align(walks, 2 * candidates - 1)
+    moments = cut_moments(walks, shares[:, ::2])
+    return aligned.mean(axis=0)[::2], retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
+
+
+def test_search_is_exact(one_lap):
+    """Both searches find what enumerating every set of cuts finds."""
+    errors = segment_errors(*search_input([one_lap[:100]], 14))
+    divisions = [(0, *cuts, 13) for k in range(6) for cuts in itertools.combinations(range(1, 13), k)]
+    spans = {cuts: [(i, j, errors[i, j]) for i, j in itertools.pairwise(cuts)] for cuts in divisions}
+    total = {cuts: sum(e for *_, e in each) for cuts, each in spans.items()}
+    for k in (1, 2, 3, 4, 6):
+        best = min((cuts for cuts in divisions if len(cuts) == k + 1), key=total.get)
+        assert tuple(best_segments(errors, k)) == best
+    for tolerance in (0.5, 0.1, 0.05, 0.03, 0.02):
+        kept = [cuts for cuts in divisions if all(e <= tolerance * (j - i) for i, j, e in spans[cuts])]
+        best = min(kept, key=lambda cuts: (len(cuts), total[cuts]))
+        assert tuple(fewest_segments(errors, tolerance)) == best
+
+
+def test_fast_errors_agree_with_one_segment_at_a_time(one_lap):
+    """Errors equal those of fitting, responding and measuring one by one; hopeless segments may look slightly worse."""
+    path, statistics = search_input([one_lap], 30)
+    errors = segment_errors(path, statistics)
+    for i, j in [(0, 2), (3, 6), (3, 9), (10, 14), (0, 15), (20, 29)]:
+        lds = LDS.from_statistics(statistics(i, j - i), path[j])
+        response = np.vstack([lds.response(path[i], 48), path[j]])
+        exact = distance_to_polyline(path[i + 1 : j], response).sum()
+        assert exact - 1e-6 <= errors[i, j] <= exact * (1.02 if exact > 0.1 * (j - i) else 1 + 1e-6)
+
+
+@settings(max_examples=50)
+@given(st.integers(0, 2**32 - 1))
+def test_fast_distances_are_never_too_small(seed):
+    """Distances near the nearest vertex bound the true distances from above, and are equal for evenly drawn curves."""
+    rng = np.random.default_rng(seed)
+    points, polylines = rng.normal(size=(3, 8, 2)), rng.normal(size=(3, 6, 2)).cumsum(axis=1)
+    exact = [distance_to_polyline(*each) for each in zip(points, polylines, strict=True)]
+    assert (distances(points, polylines) >= np.array(exact) - 1e-5).all()
+    curve = np.linspace(0, 2, 30)
+    even = np.stack([curve, np.sin(curve)], axis=1)
+    assert np.allclose(
+        distances(points[:1] / 5 + even[12], even[None])[0], distance_to_polyline(points[0] / 5 + even[12], even)
+    )
+
+
+def test_raw_statistics_from_running_sums(five_laps):
+    """Statistics of raw segments, from sums taken once, equal those computed from the samples."""
+    shares = np.tile(np.linspace(0, 1, 20), (5, 1))
+    moments = cut_moments(five_laps, shares)
+    quick, cuts = raw_statistics(five_laps, moments)(np.array([2, 7]), 6), moments.round().astype(int)
+    for which, start in enumerate([2, 7]):
+        slow = [Statistics.of(lap[cut[start] : cut[start + 6] + 1]) for lap, cut in zip(five_laps, cuts, strict=True)]
+        assert np.allclose(quick.G0[which], sum(each.G0 for each in slow))
+        assert np.allclose(quick.G1[which], sum(each.G1 for each in slow))
+
+
+def test_retimed_statistics_are_those_of_the_retimed_piece():
+    """Statistics from the aligned samples are those of cutting the piece out and re-timing it."""
+    piece = np.linspace([0.0, 0.0], [3.0, 4.0], 21)
+    quick = retimed_statistics(piece[None])(2, 6)
+    slow = Statistics.of(retime(piece[4:17], 40, 3.0))
+    assert np.allclose(quick.G0, slow.G0) and np.allclose(quick.G1, slow.G1)
+
+
+def test_slow_responses_are_followed_to_the_subgoal():
+    """The search sees even a slow system's response come close to its subgoal before it is joined to it."""
+    slow = Statistics(np.eye(2)[None], 0.995 * np.eye(2)[None])
+    responses = candidate_responses(slow, np.array([[3.0, 4.0]]))
+    assert np.linalg.norm(responses[0, -2]) < 0.05 * 5 and not responses[0, -1].any()
