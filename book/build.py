@@ -2,7 +2,7 @@
 
     python book/build.py
 
-Nothing is fetched when building or reading: formulas become MathML, and a slider, which needs a running Python, becomes
+Nothing is fetched when building or reading: formulas become MathML, and what moves only with a running Python becomes
 the picture that it shows first.
 """
 
@@ -76,7 +76,9 @@ def freeze_widgets(cell, client):
     """Replace a widget by a still while it shows what the cell made: later cells may move its controls."""
     for output in cell.get("outputs", []):
         view = output.get("data", {}).get(WIDGET)
-        if view:
+        if view and "image/png" in output.data:  # a figure that can be clicked into brings its own still
+            output.data = {"image/png": output.data["image/png"]}
+        elif view:
             output.data = {"text/html": still(client.widget_state, client.widget_buffers, view["model_id"])}
 
 

@@ -26,6 +26,14 @@ def test_a_widget_becomes_a_picture_with_its_settings():
     assert 'src="data:image/png;base64,cGljdHVyZQ=="' in still
 
 
+def test_a_figure_that_can_be_clicked_into_is_its_own_still():
+    """Of a live figure the picture stays, and nothing that would need a kernel."""
+    data = {build.WIDGET: {"model_id": "canvas"}, "image/png": "cGlj", "text/html": "<img>"}
+    output = SimpleNamespace(data=data, get=lambda key, default: data)
+    build.freeze_widgets({"outputs": [output]}, client=None)
+    assert output.data == {"image/png": "cGlj"}
+
+
 def test_everything_inside_a_widget_is_found_in_order():
     """Children come after their parent."""
     assert list(build.descendants(STATES, "box")) == ["box", "slider", "image"]
