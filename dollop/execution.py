@@ -1,8 +1,9 @@
 """Performing a task: robots, kidnapping, and what comes of it (Sec. III; Fig. 7, 10 and 12).
 
-A robot is anything with `pose` (x, y in m, theta in rad: what it believes), `true_pose`, `localised` (whether it trusts
-its belief), `touching` (None if it cannot feel), `limits`, `period` in s, `drive(v, omega)`, which lets one period
-pass, and `place(pose)`, which kidnaps it. Here is a fast one for studies; `dollop.lab.robot` has the Pioneer.
+A robot is anything with `pose` (x, y in m, theta in rad: what it believes), `localised` (whether it trusts its belief),
+`limits`, `period` in s, and `drive(v, omega)`, which lets one period pass. One that can feel what it touches has
+`touching`; a simulated one has `true_pose`, for measuring, and `place(pose)`, which kidnaps it. Here is a fast one for
+studies; `dollop.lab.robot` has the Pioneer.
 """
 
 from dataclasses import dataclass
@@ -14,8 +15,12 @@ from dollop.avoidance import Geodesic, ObstacleMap
 from dollop.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits, clip, wrap
 from dollop.trajectory import distance_to_polyline
 
-SEARCH_TURN = 0.5
-"""Turning rate in rad/s, on the spot, until the robot knows where it is."""
+SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
+"""A robot that does not know where it is turns on the spot, rad/s, and moves off what it touches, m/s: back, and if
+that has not helped within so many s, forth."""
+HELD = 1.0
+"""Time in s for which a robot goes on to move off what it touched; and for which one that was kidnapped must keep near
+the response to count as back on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +84,7 @@ class Unicycle:
     0.005
     """
 
-    localised, touching = True, None
+    localised = True
 
     def __init__(self, pose, limits=PIONEER_LIMITS, period=0.1):
         self.limits, self.period = Limits(*limits), period
@@ -89,11 +94,6 @@ class Unicycle:
         """Put the robot at rest at a pose."""
         self.pose = tuple(float(value) for value in pose)
         self.speed = self.turn = 0.0
-
-    @property
-    def true_pose(self):
-        """The pose, which this robot knows."""
-        return self.pose
 
     def drive(self, speed, turn):
         """Move for one period towards a speed in m/s and a turning rate in rad/s, within the limits."""
@@ -127,8 +127,9 @@ def perform(
     ----------
     task : Task
         Anything with a `law` (SequencedLDS) and an `environment` (Environment).
-    robot : Unicycle or LocalisedPioneer
-        Where it stands is where it starts. It drives until the task is finished or given up.
+    robot : Unicycle, LocalisedPioneer, or one of your own
+        See the top of `dollop.execution`. Where it stands is where it starts. It drives until the task is finished or
+        given up.
     control : str
         "plain" or "pursuit", the better one.
     avoid : bool
@@ -140,7 +141,8 @@ def perform(
     timeout : float
         Give up after this time in s.
     localise_within : float
-        Give up when the robot has not known where it is for this time in s. Until it knows, it turns on the spot.
+        Give up when the robot has not known where it is for this time in s. Until it knows, it turns on the spot, and
+        moves off what it touches.
 
     Returns
     -------
@@ -149,38 +151,60 @@ def perform(
     Raises
     ------
     ValueError
-        For an unknown control law, a start, subgoal or kidnapping that is not finite, off the map or in an obstacle, or
-        a time that is not positive.
+        For an unknown control law, a start, subgoal or kidnapping that is not finite, off the map or in an obstacle, a
+        time-out that is not positive, or a kidnapping before the start.
     """
     if control not in CONTROL_LAWS:
         raise ValueError(f"control must be one of {sorted(CONTROL_LAWS)}, got {control!r}")
     if not (timeout > 0 and localise_within > 0):
         raise ValueError(f"timeout and localise_within must be positive, got {timeout} and {localise_within}")
     kidnap = sorted((float(time), tuple(pose)) for time, pose in kidnap)
-    places = [place for place in (*task.law.subgoals, robot.true_pose[:2]) if np.isfinite(place).all()]
-    obstacles = ObstacleMap.of(task.environment, background, places)
-    check_places(task.law.subgoals, robot.true_pose, kidnap, obstacles)
+    places = named_places(task.law, robot, kidnap)
+    obstacles = ObstacleMap.of(task.environment, background, [place[:2] for _, place in places])
+    check_free(places, obstacles)
     supervisor = CONTROL_LAWS[control](Guidance(task.law, obstacles if avoid else None), task.law.speeds, robot)
     records, reason = drive(supervisor, robot, list(kidnap), timeout, localise_within)
     robot.drive(0.0, 0.0)
-    return as_run(records, reason, obstacles, robot.period, [time for time, _ in kidnap])
+    lasted = len(records) * robot.period
+    return as_run(records, reason, obstacles, robot.period, [time for time, _ in kidnap if time < lasted])
+
+
+class Search:
+    """What a robot does that does not know where it is: turn on the spot, and first move off what it touches."""
+
+    def __init__(self, period):
+        self.period, self.speed, self.pushed, self.off = period, -BACK_OFF, 0.0, HELD
+
+    def command(self, touching):
+        """v in m/s and omega in rad/s."""
+        if touching:
+            self.off, self.pushed = 0.0, self.pushed + self.period
+            if self.pushed > PUSHED:
+                self.speed, self.pushed = -self.speed, 0.0
+        elif self.off < HELD:
+            self.off += self.period
+        else:
+            self.speed, self.pushed = -BACK_OFF, 0.0
+            return 0.0, SEARCH_TURN
+        return self.speed, 0.0
 
 
 def drive(supervisor, robot, kidnap, timeout, localise_within):
     """The control loop: a record (pose, true pose, segment, localised, touching) per period, and why it gave up."""
-    records, blind = [], 0.0
+    records, blind, search = [], 0.0, Search(robot.period)
     while True:
         now = len(records) * robot.period
         if kidnap and now > kidnap[0][0] - robot.period / 2:
             robot.place(kidnap.pop(0)[1])
         x, y, theta = pose = robot.pose
-        records.append((pose, robot.true_pose, supervisor.active, robot.localised, robot.touching))
+        touching = getattr(robot, "touching", None)
+        records.append((pose, getattr(robot, "true_pose", pose), supervisor.active, robot.localised, touching))
         if not isfinite(x + y + theta):
             return records, f"the pose must be finite, got {x, y, theta} at {now:.1f} s"
         if robot.localised:
             blind, command = 0.0, supervisor.command(x, y, theta)
         else:
-            blind, command = blind + robot.period, (0.0, SEARCH_TURN)
+            blind, command = blind + robot.period, search.command(touching)
         if supervisor.done:
             return records, ""
         if supervisor.hopeless:
@@ -211,14 +235,30 @@ def as_run(records, reason, obstacles, period, kidnapped):
     )
 
 
-def check_places(subgoals, start, kidnap, obstacles):
-    """Raise ValueError for a subgoal, start or kidnapping that is not finite, off the map or in an obstacle."""
-    places = [(f"subgoal {k}", place) for k, place in enumerate(subgoals)]
-    places += [("the start", start), *((f"the pose of the kidnapping at {time:g} s", pose) for time, pose in kidnap)]
+def named_places(law, robot, kidnap):
+    """The places that a run needs, each with its name: subgoals, start, kidnappings.
+
+    Raises
+    ------
+    ValueError
+        One that is not finite, or a kidnapping before the start.
+    """
+    places = [(f"subgoal {k}", place) for k, place in enumerate(law.subgoals)]
+    if robot.localised:
+        places.append(("the start", robot.pose))
+    for time, pose in kidnap:
+        if not 0 <= time < np.inf:
+            raise ValueError(f"the time of a kidnapping must be 0 s or later, got {time:g}")
+        places.append((f"the pose of the kidnapping at {time:g} s", pose))
     for name, place in places:
-        x, y = (float(value) for value in place[:2])
         if not np.isfinite(place).all():
             raise ValueError(f"{name} must be finite, got {place}")
+    return places
+
+
+def check_free(places, obstacles):
+    """Raise ValueError for a named place that is off the map or in an obstacle."""
+    for name, (x, y, *_) in places:
         if not obstacles.holds(x, y):
             raise ValueError(f"{name} must lie in the lab, got ({x:.2f}, {y:.2f}), which is off the map")
         if obstacles.edge(x, y) <= -obstacles.radius:
@@ -261,21 +301,25 @@ def distances_to_law(run, law):
 
 
 def return_times(run, law, within=0.10):
-    """Time in s from each kidnapping until the robot is back within `within` m of the response from its start.
+    """Time in s from each kidnapping until the robot is back on the response from its start, and keeps to it.
 
     Parameters
     ----------
     run : Run
     law : SequencedLDS
     within : float
-        m.
+        Back is within so many m, for one second.
 
     Returns
     -------
     (M,) float array
         `inf` where it was kidnapped again, or the run ended, before.
     """
-    back = distances_to_law(run, law) <= within
+    near = np.append(distances_to_law(run, law) <= within, False)
+    away = np.flatnonzero(~near)
+    rows = np.arange(len(run.t))
+    leaves = away[np.searchsorted(away, rows)]  # the row in which the robot, if it is near, no longer is
+    back = (leaves - rows) * np.diff(run.t[:2], prepend=0)[-1] >= HELD
     ends = np.append(run.kidnapped[1:], np.inf)
     spans = [back & (run.t >= start) & (run.t < end) for start, end in zip(run.kidnapped, ends, strict=True)]
     return np.array([run.t[s.argmax()] - t if s.any() else np.inf for s, t in zip(spans, run.kidnapped, strict=True)])

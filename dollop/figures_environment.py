@@ -109,7 +109,7 @@ def figure_10b():
     plot.legend_below(figure, axes[0])
     return figure, {
         "matching_right": int(sum(experiments.matched_right(k) for k in range(len(axes)))),
-        **experiments.summary(everything),
+        **experiments.counts(everything),
         "min_clearance_m": min(run.clearance.min() for run in everything),
     }
 

@@ -127,7 +127,7 @@ def figure_12b():
     shown = experiments.slalom_demonstration(0)
     sides = experiments.passing_sides(shown.law.response(), shown.environment.centres)
     right = [experiments.same_sides(run, task, sides) for run in runs]
-    return figure, experiments.summary(runs) | {
+    return figure, experiments.counts(runs) | {
         "passed_on_the_demonstrated_side": sum(right),
         "min_clearance_m": min(run.clearance.min() for run in runs),
     }

@@ -13,7 +13,7 @@ SIZE = (6, 5.2)
 def figure_6b():
     """Subgoals and control law extracted from the demonstrations of Fig. 6a."""
     recording, observation = experiments.figure_eights(), experiments.figure_eights_observed()
-    law, laps = experiments.figure_eight_law(), experiments.figure_eight_laps()
+    law, laps = experiments.figure_eight_task().law, experiments.figure_eight_laps()
     figure, ax = plt.subplots(figsize=SIZE)
     plot.workspace(experiments.background_map(), recording.log.poses[0], observation.environment.boxes, ax)
     for k, lap in enumerate(laps):
@@ -40,7 +40,7 @@ def figure_7a():
         distances = np.concatenate([distances_to_law(run, task.law) for run in runs])
         errors = [pose_errors(run) for run in runs]
         metrics[control] = {
-            **experiments.summary(runs),
+            **experiments.counts(runs),
             "mean_distance_m": distances.mean(),
             "max_distance_m": distances.max(),
             "min_clearance_m": min(run.clearance.min() for run in runs),
@@ -61,7 +61,7 @@ def figure_7b():
         draw_runs(ax, task, runs, {"plain": "plain law", "aware": "pursuit, going round obstacles"}[name])
         times = np.concatenate([return_times(run, task.law) for run in runs])
         back = times[np.isfinite(times)]
-        metrics[name] = experiments.summary(runs) | {"return_time_s": back.mean() if len(back) else None}
+        metrics[name] = experiments.counts(runs) | {"return_time_s": back.mean() if len(back) else None}
     plot.legend_below(figure, axes[0])
     return figure, metrics["plain"] | {f"{key}_aware": value for key, value in metrics["aware"].items()}
 

@@ -9,7 +9,7 @@ from rooms import CANS, FURNITURE, figure_eight_task, room_map
 from dollop.avoidance import INFLUENCE, ObstacleMap
 from dollop.control import PIONEER_LIMITS, Limits
 from dollop.environment import Environment
-from dollop.execution import Unicycle, distances_to_law, free_poses, perform, return_times
+from dollop.execution import Search, Unicycle, distances_to_law, free_poses, perform, return_times
 from dollop.trajectory import distance_to_polyline
 
 START = (4.5, 3.6, -0.7)
@@ -205,13 +205,78 @@ def test_a_pose_that_is_lost_ends_the_run(task):
 
 
 def test_return_times(task):
-    """The time until the robot is back on its response: none if it is put on it, some if beside it."""
-    response = task.law.response(START[:2])
-    on, beside = response[len(response) // 2], (4.5, 5.8)
-    runs = [perform(task, Unicycle(START), kidnap=[(8.0, (*place, 0.0))]) for place in (on, beside)]
+    """The time until the robot keeps to its response again: none where it would be anyway, some beside it."""
+    undisturbed = perform(task, Unicycle(START))
+    runs = [perform(task, Unicycle(START), kidnap=[(8.0, p)]) for p in (undisturbed.poses[80], (4.5, 5.8, 0.0))]
     assert return_times(runs[0], task.law) == pytest.approx([0.0], abs=1e-9)
     assert 0.5 < return_times(runs[1], task.law)[0] < 20
     assert runs[0].kidnapped == pytest.approx([8.0])
+
+
+def test_crossing_the_response_is_not_coming_back(task):
+    """A robot put on a part of the response that it is not heading along leaves it at once, and is not back yet."""
+    response = task.law.response(START[:2])
+    run = perform(task, Unicycle(START), kidnap=[(8.0, (*response[len(response) // 2], 0.0))])
+    (time,) = return_times(run, task.law)
+    assert distances_to_law(run, task.law)[80] < 0.01
+    assert 2 < time < 20
+
+
+def test_only_kidnappings_that_happened_are_told(task):
+    """A kidnapping after the end of the run is none."""
+    run = perform(task, Unicycle(START), kidnap=[(8.0, (4.5, 5.8, 0.0)), (1e9, (4.5, 5.8, 0.0))])
+    assert run.finished and run.kidnapped == pytest.approx([8.0])
+
+
+class Own:
+    """A robot with nothing but what `perform` needs: it does at once what it is told."""
+
+    localised, limits, period = True, PIONEER_LIMITS, 0.1
+
+    def __init__(self, pose):
+        self.pose = pose
+
+    def drive(self, speed, turn):
+        """Move for one period."""
+        x, y, theta = self.pose
+        step = speed * self.period
+        self.pose = x + step * np.cos(theta), y + step * np.sin(theta), theta + turn * self.period
+
+
+def test_a_robot_of_ones_own_performs(task):
+    """Pose, localised, limits, period and drive are enough; the poses it believes are then all there is."""
+    run = perform(task, Own(START))
+    assert run.finished
+    np.testing.assert_array_equal(run.poses, run.true_poses)
+
+
+class Scraping(Own):
+    """It touches something and is lost, until it has backed off by 5 cm."""
+
+    localised = False
+
+    @property
+    def touching(self):
+        """Whether it is still near what it hit."""
+        self.localised = self.localised or self.pose[0] < START[0] - 0.05
+        return not self.localised
+
+
+def test_a_lost_robot_backs_away_from_what_it_touches(task):
+    """It does not turn on the spot against an obstacle: straight back first."""
+    run = perform(task, Scraping((*START[:2], 0.0)))
+    assert run.finished and run.collisions == 1
+    lost = ~run.localised
+    assert lost[:5].all() and np.ptp(run.poses[lost, 2]) == 0
+
+
+def test_a_lost_robot_tries_the_other_way():
+    """Backing off that does not help turns into going forth, and after contact it goes on for a second."""
+    search = Search(0.1)
+    pressed = [search.command(True)[0] for _ in range(50)]
+    assert pressed[:18] == [-0.1] * 18 and pressed[22:38] == [0.1] * 16
+    freed = [search.command(False) for _ in range(12)]
+    assert [v for v, _ in freed[:10]] == [pressed[-1]] * 10 and freed[-1] == (0.0, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -222,6 +287,8 @@ def test_return_times(task):
         ({"kidnap": [(3.0, (3.0, 6.6, 0.0))]}, "kidnapping at 3 s must be free"),
         ({"kidnap": [(3.0, (np.nan, 2.0, 0.0))]}, "kidnapping at 3 s must be finite"),
         ({"kidnap": [(3.0, (20.0, 2.0, 0.0))]}, "kidnapping at 3 s must lie in the lab"),
+        ({"kidnap": [(np.nan, (3.0, 2.0, 0.0))]}, "the time of a kidnapping must be 0 s or later, got nan"),
+        ({"kidnap": [(-1.0, (3.0, 2.0, 0.0))]}, "the time of a kidnapping must be 0 s or later, got -1"),
         ({"robot": Unicycle((7.5, 0.3, 0.0))}, "the start must be free"),
         ({"robot": Unicycle((4.0, np.nan, 0.0))}, "the start must be finite"),
         ({"robot": Unicycle((4.0, -5.0, 0.0))}, "the start must lie in the lab"),
