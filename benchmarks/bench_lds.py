@@ -31,7 +31,7 @@ def plain_fit(walks, tolerance=0.02):
     for i in range(CANDIDATES):
         for j in range(i + 2, CANDIDATES):
             first, *others = (Statistics.of(retime(walk[2 * i : 2 * j + 1], STEPS, DECAY)) for walk in aligned)
-            response = LDS.from_statistics(sum(others, first), path[j]).response(path[i], HORIZON)
+            response = LDS(sum(others, first), path[j]).response(path[i], HORIZON)
             errors[i, j] = distance_to_polyline(path[i + 1 : j], np.vstack([response, path[j]])).sum()
     return len(fewest_segments(errors, tolerance)) - 1
 

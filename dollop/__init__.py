@@ -35,10 +35,10 @@ from dollop.lds import LDS
 from dollop.logs import read_log, write_log
 from dollop.matching import Matching, match
 from dollop.observation import Observation, observe
+from dollop.repetition import laps
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
 from dollop.tracking import Motion, Track, Tracker
-from dollop.trajectory import laps
 
 __all__ = [
     "LDS",

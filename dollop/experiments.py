@@ -9,8 +9,8 @@ from dollop.execution import free_poses, perform
 from dollop.gridmap import OccupancyGrid
 from dollop.matching import match
 from dollop.observation import observe
+from dollop.repetition import laps
 from dollop.task import Demonstration, Task, learn
-from dollop.trajectory import laps
 
 SEED = 2004
 """Every experiment draws from this seed, the year of the paper."""

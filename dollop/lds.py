@@ -6,7 +6,8 @@ The companion work that the paper cites for the fit could not be found: this one
 Symbols: A (2, 2) matrix of an LDS, G0 = sum x[n] x[n]^T and G1 = sum x[n+1] x[n]^T its statistics, d = 2 dimensions.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,7 +18,7 @@ STEPS, DECAY = 40, 3.0  # a re-timed segment: its steps, and the time constants 
 NOTHING = 1e-18  # m^2, a squared length that counts as zero
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Statistics:
     """All that the fit needs to know of a segment; those of merged segments are the sum.
 
@@ -65,34 +66,44 @@ class Statistics:
         return np.swapaxes(np.linalg.solve(G0, np.swapaxes(G1, -1, -2)), -1, -2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LDS:
     """A linear dynamical system that comes to rest at its subgoal, from anywhere.
 
     Attributes
     ----------
     A : (2, 2) float array
-        Per step, spectral radius below one.
+        Per step, spectral radius below one; it follows from the statistics.
+    statistics : Statistics
+        Those of two segments add up to the LDS that describes both, if both are re-timed or neither is.
     goal : (2,) float array
         The subgoal, m.
-    statistics : Statistics
-        What A was computed from. Adding those of two segments gives the LDS that describes both, if both are re-timed
-        or neither is.
+
+    Raises
+    ------
+    ValueError
+        Statistics or a goal that are not finite or not of two dimensions, or statistics that no trajectory has.
     """
 
-    A: np.ndarray
+    statistics: Statistics
     goal: np.ndarray
-    statistics: Statistics = field(repr=False)
 
     def __post_init__(self):
+        object.__setattr__(self, "goal", np.array(self.goal, float))
+        G0, G1 = np.asarray(self.statistics.G0, float), np.asarray(self.statistics.G1, float)
+        if G0.shape != (2, 2) or G1.shape != (2, 2) or self.goal.shape != (2,):
+            raise ValueError(f"G0 and G1 must be (2, 2) and goal (2,), got {G0.shape}, {G1.shape}, {self.goal.shape}")
+        if not (np.isfinite(G0).all() and np.isfinite(G1).all() and np.isfinite(self.goal).all()):
+            raise ValueError(f"G0, G1 and goal must be finite, got {G0.tolist()}, {G1.tolist()}, {self.goal}")
         radius = np.abs(np.linalg.eigvals(self.A)).max()
         if not radius < 1:
             raise ValueError(f"A must have a spectral radius below one, got {radius}")
 
-    @classmethod
-    def from_statistics(cls, statistics, goal):
-        """The LDS with the given statistics (G0, G1) that ends at `goal` (2,), in m."""
-        return cls(statistics.matrix, np.asarray(goal, float), statistics)
+    @cached_property
+    def A(self):
+        return self.statistics.matrix
+
+    from_statistics = classmethod(lambda cls, statistics, goal: cls(statistics, goal))  # TEMPORARY
 
     @classmethod
     def fit(cls, trajectories, retimed=True):
@@ -129,26 +140,36 @@ class LDS:
         samples = [retime(walk, STEPS, DECAY) if retimed else walk for walk in walks]
         first, *others = map(Statistics.of, samples)
         goal = np.mean([walk[-1] for walk in walks], axis=0)
-        return cls.from_statistics(sum(others, first), goal)
+        return cls(sum(others, first), goal)
 
     def turned(self, angle):
-        """The LDS turned about its subgoal by an angle in rad: A <- R A R^T."""
+        """The LDS turned about its subgoal by an angle in rad: A becomes R A R^T."""
         R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         G0, G1 = self.statistics.G0, self.statistics.G1
-        return replace(self, A=R @ self.A @ R.T, statistics=Statistics(R @ G0 @ R.T, R @ G1 @ R.T))
+        return replace(self, statistics=Statistics(R @ G0 @ R.T, R @ G1 @ R.T))
 
     def step(self, x):
         """The next state after x, (..., 2), in m: g + A (x - g)."""
-        return self.goal + (np.asarray(x, float) - self.goal) @ self.A.T
+        return self.goal + (check_states(x) - self.goal) @ self.A.T
 
     def response(self, x0, n):
         """The n steps after x0 (2,), in m: (n + 1, 2), x0 included."""
-        return self.goal + powers_on(self.A, np.asarray(x0, float) - self.goal, n)
+        if n != int(n) or n < 0:
+            raise ValueError(f"n must be a whole number of steps from 0 on, got {n}")
+        return self.goal + powers_on(self.A, check_states(x0) - self.goal, int(n))
 
     def lyapunov(self, x):
         """(x - g)^T G0^-1 (x - g) for x (..., 2) in m: zero at the subgoal, and it never grows along a response."""
-        offset = np.asarray(x, float) - self.goal
+        offset = check_states(x) - self.goal
         return dot(offset, np.linalg.solve(self.statistics.regular[0], offset[..., None])[..., 0])
+
+
+def check_states(x):
+    """States as a float array (..., 2); ValueError if they are not finite or of another dimension."""
+    states = np.asarray(x, float)
+    if not states.ndim or states.shape[-1] != 2 or not np.isfinite(states).all():
+        raise ValueError(f"a state must be two finite numbers, got {x}")
+    return states
 
 
 def powers_on(A, x, n):

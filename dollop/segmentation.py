@@ -13,6 +13,7 @@ from dollop.lds import DECAY, NOTHING, STEPS, Statistics, dot, powers_on
 from dollop.trajectory import remaining_share
 
 HORIZON, SETTLED = 48, 4.0  # the search follows a response over this many points, this many time constants
+EVEN = 1e-8  # m per squared cut: among equal errors the more even division, not what rounding prefers
 
 
 def retimed_statistics(aligned):
@@ -102,11 +103,14 @@ def segment_errors(path, statistics):
 def candidate_responses(statistics, x0):
     """Responses (B, HORIZON + 2, d) from offsets x0 (B, d), up to the subgoal at 0.
 
-    Slow systems are shown by every m-th state, m such that the responses settle within the horizon.
+    Slow systems are shown by every m-th state, m a power of two such that the response settles within the horizon.
     """
-    decay = np.clip(np.median(statistics.decay), 0.5, 1 - 1e-6)
-    stride = max(1, int(-SETTLED / (HORIZON * np.log(decay))))
-    states = powers_on(np.linalg.matrix_power(statistics.matrix, stride), x0, HORIZON)
+    time_constants = -1 / np.log(np.clip(statistics.decay, 0.5, 1 - 1e-6))  # in steps
+    doublings = np.log2(np.maximum(SETTLED * time_constants / HORIZON, 1)).astype(int)
+    step = statistics.matrix
+    for k in range(doublings.max()):
+        step = np.where((k < doublings)[:, None, None], step @ step, step)
+    states = powers_on(step, x0, HORIZON)
     return np.concatenate([states, np.zeros_like(states[:, :1])], axis=1)
 
 
@@ -173,8 +177,13 @@ def best_segments(errors, n_segments):
 
 
 def divide(errors, enough):
-    """Dynamic programming over D[k][j] = min_i D[k-1][i] + errors[i][j], until enough(D[k][-1], k); None if never."""
-    total = np.where(np.arange(len(errors)) == 0, 0.0, np.inf)
+    """Dynamic programming over D[k][j] = min_i D[k-1][i] + errors[i][j], until enough(D[k][-1], k); None if never.
+
+    On straight parts of a trajectory many divisions have the same errors: then the most even one, cut early, is best.
+    """
+    cut = np.arange(len(errors))
+    errors = errors + EVEN * ((cut - cut[:, None]) ** 2 + 0.01 * cut)
+    total = np.where(cut == 0, 0.0, np.inf)
     before = []
     for k in range(1, len(errors)):
         sums = total[:, None] + errors

@@ -8,8 +8,11 @@ from dollop.lds import LDS
 from dollop.segmentation import best_segments, fewest_segments, raw_statistics, retimed_statistics, segment_errors
 from dollop.trajectory import align, arc_length, check_trajectories, check_trajectory, distance_to_polyline, resample
 
+LEAST_REACH = 1e-6  # m: nearer to a subgoal than what coordinates can tell, a response would never arrive
+MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class SequencedLDS:
     """A trajectory as a sequence of LDS, each handing over to the next at its subgoal (Sec. III).
 
@@ -82,7 +85,7 @@ class SequencedLDS:
         errors = segment_errors(path, statistics)
         cuts = fewest_segments(errors, tolerance) if n_segments is None else best_segments(errors, n_segments)
         spans = zip(cuts[:-1], np.diff(cuts), path[cuts[1:]], strict=True)
-        segments = tuple(LDS.from_statistics(statistics(start, length), goal) for start, length, goal in spans)
+        segments = tuple(LDS(statistics(start, length), goal) for start, length, goal in spans)
         return cls(segments, path[0], demonstrated_speeds(walks, moments[:, cuts], sample_period))
 
     def response(self, start=None, reach=0.01):
@@ -96,7 +99,7 @@ class SequencedLDS:
         start : (2,) array_like, optional
             m; by default the demonstrations' start.
         reach : float
-            m, positive.
+            m, at least a micrometre.
 
         Returns
         -------
@@ -106,8 +109,8 @@ class SequencedLDS:
         state = np.asarray(self.start if start is None else start, float)
         if state.shape != (2,) or not np.isfinite(state).all():
             raise ValueError(f"start must be two finite numbers, got {start}")
-        if not reach > 0:
-            raise ValueError(f"reach must be positive, got {reach}")
+        if not reach >= LEAST_REACH:
+            raise ValueError(f"reach must be at least {LEAST_REACH:g} m, got {reach}")
         states = [state]
         for segment in self.segments:
             while np.linalg.norm(states[-1] - segment.goal) > reach:
@@ -178,10 +181,10 @@ def check_search(tolerance, n_segments, sample_period, candidates):
         raise ValueError(f"tolerance must be positive, got {tolerance}")
     if not 0 < sample_period < np.inf:
         raise ValueError(f"sample_period must be positive, got {sample_period}")
-    if candidates < 3:
-        raise ValueError(f"candidates must be at least 3, got {candidates}")
+    if not 3 <= candidates <= MOST_CANDIDATES:
+        raise ValueError(f"candidates must be 3 to {MOST_CANDIDATES}, got {candidates}")
     most = (candidates - 1) // 2
-    if n_segments is not None and (n_segments != int(n_segments) or not 1 <= n_segments <= most):
+    if n_segments is not None and n_segments not in range(1, most + 1):
         raise ValueError(f"n_segments must be a whole number from 1 to {most} (half the candidates), got {n_segments}")
 
 

@@ -13,8 +13,8 @@ from dollop.environment import Environment
 from dollop.files import FormatError, read_bytes, whole_file
 from dollop.lds import LDS, Statistics
 from dollop.matching import Matching, match
+from dollop.repetition import laps
 from dollop.sequenced_lds import SequencedLDS
-from dollop.trajectory import laps
 
 FORMAT, VERSION = "dollop task", 1
 
@@ -172,8 +172,7 @@ def as_dict(task):
     """The task as plain lists, for JSON. What the demonstrations had in common is not kept, only what came of it."""
     law, association = task.law, task.association
     segments = [
-        {name: getattr(segment, name).tolist() for name in ("A", "goal")}
-        | {name: getattr(segment.statistics, name).tolist() for name in ("G0", "G1")}
+        {"goal": segment.goal.tolist()} | {name: getattr(segment.statistics, name).tolist() for name in ("G0", "G1")}
         for segment in law.segments
     ]
     tied = {name: getattr(association, name).tolist() for name in ("corners", "weights", "differences")}
@@ -192,11 +191,7 @@ def from_dict(content):
     """A task from what `as_dict` made."""
     environment = Environment(np.array(content["boxes"], float))
     segments = tuple(
-        LDS(
-            np.array(segment["A"], float),
-            np.array(segment["goal"], float),
-            Statistics(np.array(segment["G0"], float), np.array(segment["G1"], float)),
-        )
+        LDS(Statistics(np.array(segment["G0"], float), np.array(segment["G1"], float)), segment["goal"])
         for segment in content["segments"]
     )
     tied = content["association"]

@@ -20,6 +20,7 @@ from dollop.layouts import random_layouts, right_indices
 from dollop.lds import LDS
 from dollop.matching import match
 from dollop.observation import observe
+from dollop.repetition import laps
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn, members_along
 from dollop.tracking import (
@@ -32,7 +33,7 @@ from dollop.tracking import (
     track_objects,
     update,
 )
-from dollop.trajectory import distance_to_polyline, laps, mean_trajectory
+from dollop.trajectory import distance_to_polyline, mean_trajectory
 
 # ---- what the experiments of one seed share
 

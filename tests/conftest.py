@@ -1,9 +1,9 @@
-"""What all tests share: the same examples on every machine, and names without file content."""
+"""What all tests share: the same examples on every machine, however slow, and names without file content."""
 
 from hypothesis import settings
 
-# `pytest --hypothesis-profile=default` draws new examples every time: do that before a release, not in CI.
-settings.register_profile("repeatable", derandomize=True)
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("fresh", deadline=None)  # pytest --hypothesis-profile=fresh: new examples every time
 settings.load_profile("repeatable")
 
 

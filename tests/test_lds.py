@@ -71,7 +71,7 @@ def test_merging_is_adding(some, others):
 def test_moving_goal_and_start_moves_the_response():
     """A response is shifted with its subgoal and scaled with its distance from it."""
     lds = LDS.fit(np.array([[0.0, 0.0], [1.0, 0.4], [2.0, 0.5]]))
-    there = LDS.from_statistics(lds.statistics, lds.goal + [5, 7])
+    there = LDS(lds.statistics, lds.goal + [5, 7])
     assert np.allclose(there.response([5, 7], 30), lds.response([0, 0], 30) + [5, 7])
     far = lds.response(lds.goal + 2 * (np.zeros(2) - lds.goal), 30) - lds.goal
     assert np.allclose(far, 2 * (lds.response([0, 0], 30) - lds.goal))
@@ -101,7 +101,29 @@ def test_retiming_draws_arcs_well(turn, within):
 
 
 def test_no_unstable_system():
-    """A matrix that does not come to rest is refused."""
-    still = Statistics(np.eye(2), np.eye(2))
+    """Statistics that no trajectory has are refused, and so are those that are not finite or of another dimension."""
     with pytest.raises(ValueError, match=r"spectral radius below one, got 1\.0"):
-        LDS(np.eye(2), np.zeros(2), still)
+        LDS(Statistics(np.eye(2), np.eye(2)), np.zeros(2))
+    with pytest.raises(ValueError, match="must be finite"):
+        LDS(Statistics(np.diag([1.0, np.nan]), np.eye(2)), np.zeros(2))
+    with pytest.raises(ValueError, match=r"must be \(2, 2\) and goal \(2,\), got \(3, 3\)"):
+        LDS(Statistics(np.eye(3), np.zeros((3, 3))), np.zeros(3))
+
+
+@pytest.mark.parametrize("state", [[1.0], 5, [np.nan, 0], [1.0, 2.0, 3.0]])
+def test_what_is_no_state_is_refused(state):
+    """A state is two finite numbers: nothing is stretched to fit."""
+    lds = LDS.fit([[0.0, 0.0], [1.0, 0.5], [2.0, 0.0]])
+    for ask in (lds.step, lds.lyapunov, lambda x: lds.response(x, 3)):
+        with pytest.raises(ValueError, match="a state must be two finite numbers"):
+            ask(state)
+    with pytest.raises(ValueError, match="whole number of steps from 0 on, got -1"):
+        lds.response([0, 0], -1)
+
+
+def test_turning_turns_the_matrix():
+    """The LDS turned by an angle has the matrix R A R^T, and the same subgoal."""
+    lds, c, s = LDS.fit([[0.0, 0.0], [1.0, 0.4], [2.0, 0.1]]), np.cos(0.7), np.sin(0.7)
+    R = np.array([[c, -s], [s, c]])
+    assert np.allclose(lds.turned(0.7).A, R @ lds.A @ R.T)
+    assert (lds.turned(0.7).goal == lds.goal).all()

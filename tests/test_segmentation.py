@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from walks import walk_figure_eights
 
 from dollop.lds import LDS, Statistics
+from dollop.repetition import laps
 from dollop.segmentation import (
     best_segments,
     candidate_responses,
@@ -19,7 +20,7 @@ from dollop.segmentation import (
     segment_errors,
 )
 from dollop.sequenced_lds import cut_moments
-from dollop.trajectory import align, distance_to_polyline, laps, retime
+from dollop.trajectory import align, distance_to_polyline, retime
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,7 @@ def test_fast_errors_agree_with_one_segment_at_a_time(one_lap):
     path, statistics = search_input([one_lap], 30)
     errors = segment_errors(path, statistics)
     for i, j in [(0, 2), (3, 6), (3, 9), (10, 14), (0, 15), (20, 29)]:
-        lds = LDS.from_statistics(statistics(i, j - i), path[j])
+        lds = LDS(statistics(i, j - i), path[j])
         response = np.vstack([lds.response(path[i], 48), path[j]])
         exact = distance_to_polyline(path[i + 1 : j], response).sum()
         assert exact - 1e-6 <= errors[i, j] <= exact * (1.02 if exact > 0.1 * (j - i) else 1 + 1e-6)

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from walks import any_walks, moving, walk_figure_eights
 
 from dollop.lds import LDS
+from dollop.repetition import laps
 from dollop.sequenced_lds import SequencedLDS
-from dollop.trajectory import arc_length, distance_to_polyline, laps, mean_trajectory
+from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +150,7 @@ def test_moved_subgoals_move_the_response(law):
     """Shifting or scaling all subgoals and the start shifts or scales the response; no LDS changes its matrix."""
     moved = law.with_subgoals(2 * law.subgoals + [5, 5], start=2 * law.start + [5, 5])
     assert np.allclose(moved.response(reach=0.02), 2 * law.response(reach=0.01) + [5, 5])
-    assert all(a.A is b.A for a, b in zip(law.segments, moved.segments, strict=True))
+    assert all((a.A == b.A).all() for a, b in zip(law.segments, moved.segments, strict=True))
 
 
 def test_one_moved_subgoal_changes_only_its_neighbours(law):
@@ -189,8 +190,10 @@ def test_handwritten_letters_are_drawn(letter):
         ({"n_segments": 0}, "n_segments must be a whole number from 1 to 49.*got 0"),
         ({"n_segments": 50}, "n_segments must be a whole number from 1 to 49.*got 50"),
         ({"n_segments": 2.5}, "n_segments must be a whole number"),
+        ({"n_segments": np.nan}, "n_segments must be a whole number.*got nan"),
+        ({"candidates": 10**6}, "candidates must be 3 to 1000, got 1000000"),
         ({"sample_period": -0.1}, "sample_period must be positive, got -0.1"),
-        ({"candidates": 2}, "candidates must be at least 3, got 2"),
+        ({"candidates": 2}, "candidates must be 3 to 1000, got 2"),
         ({"tolerance": 1e-6}, r"tolerance 1e-06 m cannot be kept with 100 candidate cuts, 0\.\d+ m can"),
     ],
 )
@@ -232,7 +235,7 @@ def test_bad_subgoals_and_starts(law):
         law.with_subgoals(law.subgoals[:-1])
     with pytest.raises(ValueError, match="start must be two finite numbers"):
         law.response([np.nan, 0])
-    with pytest.raises(ValueError, match="reach must be positive, got 0"):
+    with pytest.raises(ValueError, match="reach must be at least 1e-06 m, got 0"):
         law.response(reach=0)
 
 

@@ -123,7 +123,7 @@ def damaged(change):
         (damaged(lambda c: c.update(version=99)), "version must be 1, got 99"),
         (damaged(lambda c: c.pop("segments")), "segments"),
         (damaged(lambda c: c["segments"].pop()), "one speed per segment"),
-        (damaged(lambda c: c["segments"][0].update(A=[[2, 0], [0, 2]])), "spectral radius"),
+        (damaged(lambda c: c["segments"][0].update(G0=[[1, 0], [0, 1]], G1=[[2, 0], [0, 2]])), "spectral radius"),
         (damaged(lambda c: c["boxes"].pop()), "corners must be 0 to 3"),
         (damaged(lambda c: c["association"]["weights"].pop()), "association must tie"),
         (damaged(lambda c: c.update(start=[None, 1.0])), "finite"),
