@@ -21,7 +21,8 @@ from math import pi
 
 import numpy as np
 
-from .environment import Environment
+from dollop.environment import Environment
+from dollop.matching import match_confidently
 
 _EPSILON = 0.05**2  # m²: corners are not known better than to a cell of the foreground grid
 
@@ -35,9 +36,9 @@ class Association:
     environment : Environment
         Where the subgoals were demonstrated.
     corners : (K, m) int array
-        Which corners each subgoal is tied to, the nearest first.
+        Which corners each subgoal is tied to; from `associate` the nearest first.
     weights : (K, m) array
-        w_l, one row sums to 1.
+        w_l, none negative. One row sums to 1, or to less after `carried` has cut ties to objects that are gone.
     differences : (K, m, 2) array
         s - omega_l in m.
     """
@@ -55,8 +56,8 @@ class Association:
         environment : Environment
             The objects as they stand now.
         matching : Matching, optional
-            From the associated environment to this one; by default the objects are the same in the same order. Corners
-            that it leaves out drop out, and the weights of a subgoal's other corners take their part.
+            From the associated environment to this one; found by `match` when not given. Corners that it leaves out
+            drop out, and the weights of a subgoal's other corners take their part.
         turned : bool
             Beyond the paper: turn the differences with the layout, see `layout_turn`.
 
@@ -68,8 +69,8 @@ class Association:
         Raises
         ------
         ValueError
-            Without matching, where the counts differ; with one, where it belongs to other environments or leaves out
-            all corners of a subgoal.
+            Where the environments cannot be matched with confidence, where a given matching belongs to others, or
+            where it leaves out all corners of a subgoal.
         """
         indices = self._indices(environment, matching)
         partners = indices[self.corners]
@@ -100,9 +101,9 @@ class Association:
     def _indices(self, environment, matching):
         n, m = len(self.environment.corners), len(environment.corners)
         if matching is None:
-            if n != m:
-                raise ValueError(f"without a matching the number of objects must stay {n // 4}, got {m // 4}")
-            return np.arange(n)
+            if np.array_equal(self.environment.boxes, environment.boxes):
+                return np.arange(n)
+            matching = match_confidently(self.environment, environment, ("the associated environment", "the new one"))
         if len(matching.indices) != n or matching.indices.max(initial=-1) >= m:
             raise ValueError(
                 f"the matching must go from the {n} associated corners to the {m} present ones, "
@@ -206,7 +207,7 @@ class Frames:
         if not np.isfinite(directions).all():
             raise ValueError(f"directions must be finite, got {directions.tolist()}")
         object.__setattr__(self, "positions", positions)
-        object.__setattr__(self, "directions", (directions + pi) % (2 * pi) - pi)
+        object.__setattr__(self, "directions", pi - (pi - directions) % (2 * pi))
 
     @classmethod
     def of(cls, environment):
@@ -288,8 +289,9 @@ def _variances(local):
     """(M, K) variance of D demonstrations (D, M, K, 2), up to a factor; of one alone it is the same for all frames."""
     squares = ((local - local.mean(axis=0)) ** 2).sum(axis=(0, 3))
     # A handful of demonstrations may agree by chance: one virtual one, of mean variance, keeps the weights finite.
+    # Less variance than corners are known to tells nothing: it may be mere rounding.
     usual = squares.mean() / max(len(local) - 1, 1)
-    return squares + (usual if usual > 0 else 1.0)
+    return squares + max(usual, _EPSILON)
 
 
 def _seen_from(frames, positions):

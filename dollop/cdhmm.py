@@ -30,6 +30,7 @@ from dollop.structure import (
     LEAST_COVERAGE,
     align_chain,
     coverage_of,
+    earliest,
     estimate_structure,
     mean_place,
     numbered,
@@ -37,8 +38,11 @@ from dollop.structure import (
     set_apart,
 )
 
+LEAST_SPREAD, MOST_SPREAD = 1e-6, 1e6  # m: beyond, the evidence drowns in rounding
+FARTHEST = 1e9  # m: so far from the origin a place may lie
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class SubgoalHMM:
     """What several demonstrations have in common: a CDHMM over subgoals, acyclic, its structure estimated (Sec. V).
 
@@ -107,8 +111,10 @@ class SubgoalHMM:
         sequences = tuple(checked_sequence(sequence, f"demonstration {k}") for k, sequence in enumerate(sequences))
         if not sequences:
             raise ValueError("sequences must hold at least one demonstration, got none")
-        if not (np.isfinite(spread) and spread > 0):
+        if not 0 < spread < np.inf:
             raise ValueError(f"spread must be positive and finite, got {spread}")
+        if not LEAST_SPREAD <= spread <= MOST_SPREAD:
+            raise ValueError(f"spread must lie between {LEAST_SPREAD:g} and {MOST_SPREAD:g} m, got {spread}")
         chains = chains_of(sequences)
         prior = prior_over(chains.points, spread)
         labels = numbered(set_apart(estimate_structure(chains, prior), chains), chains)
@@ -138,9 +144,11 @@ class SubgoalHMM:
     def most_likely_path(self):
         """States of the most probable way from start to end, in order (L,): the task (Sec. V).
 
-        Among equally probable ways the one of fewer states, then the one whose states hold more subgoals.
+        Among equally probable ways the one of fewer states, then the one whose states hold more subgoals, then the one
+        that was demonstrated earlier.
         """
-        return path_through(self._grown()[1]) - FIRST
+        chains, graph, _ = self._grown()
+        return path_through(graph, earliest(np.concatenate(self.states) + FIRST, chains)) - FIRST
 
     def coverage(self):
         """The share of the states on the most-likely path that each demonstration visits, (demonstrations,)."""
@@ -277,4 +285,6 @@ def checked_sequence(sequence, name):
         raise ValueError(f"{name} must hold at least one subgoal, as (K, 2), got shape {sequence.shape}")
     if not np.isfinite(sequence).all():
         raise ValueError(f"{name} must be finite, got {sequence[~np.isfinite(sequence).all(1)][0]}")
+    if np.abs(sequence).max() > FARTHEST:
+        raise ValueError(f"{name} must lie within {FARTHEST:g} m of the origin, got {np.abs(sequence).max():g} m")
     return sequence

@@ -5,8 +5,8 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from .environment import Environment
-from .matching import match
+from dollop.environment import Environment
+from dollop.matching import match
 
 _CHANGES = {"none": (0, 0), "missing": (0, 1), "added": (1, 0)}
 

@@ -29,14 +29,12 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from .environment import integer_costs
+from dollop.environment import integer_costs
 
-_MOVED = 0.4  # sigma, m: how far objects are moved by themselves
 _KAPPA = 1.0  # of a layout that was turned, small turns are a little likelier
 _TURNED = 4.0  # L_turn, nats
 _SHIFTED = 6.0  # L_shift, nats
 _UNMOVED = np.log1p(np.exp(-_TURNED)) + np.log1p(np.exp(-_SHIFTED))  # what makes it cost 0 if nothing moved
-_LEFT_OUT = 3.0  # m
 _ODDS = 20.0  # a matching is confident where it is this much more probable than the second best
 
 _ENUMERATED = 2000  # up to so many partial matchings all are tried
@@ -72,7 +70,7 @@ class Matching:
     turn: float = 0.0
 
 
-def match(environment_i, environment_j, method="robust", left_out=_LEFT_OUT):
+def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4):
     """Match the corners of two environments (Sec. IV-A).
 
     Parameters
@@ -85,6 +83,9 @@ def match(environment_i, environment_j, method="robust", left_out=_LEFT_OUT):
     left_out : float
         Robust only. Leaving out an object of each environment costs as much as if one had been moved by this many
         metres, beside the others.
+    moved : float
+        Robust only. How far objects are moved by themselves: sigma, standard deviation per axis in m. Where they move
+        farther than this, matchings are called confident too easily.
 
     Returns
     -------
@@ -107,8 +108,9 @@ def match(environment_i, environment_j, method="robust", left_out=_LEFT_OUT):
     """
     if method not in ("robust", "literal"):
         raise ValueError(f"method must be 'robust' or 'literal', got {method!r}")
-    if not left_out > 0:
-        raise ValueError(f"left_out must be positive, got {left_out}")
+    for name, length in (("left_out", left_out), ("moved", moved)):
+        if not 0 < length < np.inf:
+            raise ValueError(f"{name} must be positive and finite, got {length}")
     if min(len(environment_i), len(environment_j)) < 2:
         raise ValueError(
             f"matching compares layouts: each environment needs at least 2 objects, "
@@ -116,7 +118,30 @@ def match(environment_i, environment_j, method="robust", left_out=_LEFT_OUT):
         )
     if method == "literal":
         return _match_literally(environment_i, environment_j)
-    return _match_robustly(environment_i, environment_j, left_out)
+    return _match_robustly(environment_i, environment_j, left_out, moved)
+
+
+def match_confidently(environment_i, environment_j, names=("the task's environment", "the new one")):
+    """The robust matching of two environments, if it is sure; of one object in each there is only one.
+
+    Raises
+    ------
+    ValueError
+        As `match`, and if a second matching is nearly as good: then ask the user, do not guess. `names` say what the
+        two are.
+    """
+    if len(environment_i) == len(environment_j) == 1:
+        return Matching(np.arange(4), 0.0, np.inf, True)
+    try:
+        matching = match(environment_i, environment_j)
+    except ValueError as error:
+        raise ValueError(f"{names[0]} and {names[1]}: {error}") from error
+    if not matching.confident:
+        raise ValueError(
+            f"{names[0]} and {names[1]} cannot be matched with confidence: the second-best matching costs only "
+            f"{matching.margin:.2f} more; give the matching, or move the objects apart"
+        )
+    return matching
 
 
 def _match_literally(environment_i, environment_j):
@@ -131,10 +156,10 @@ def _match_literally(environment_i, environment_j):
     return Matching(indices, float(costs[rows, indices].sum()), margin, margin > len(indices))
 
 
-def _match_robustly(environment_i, environment_j, left_out):
-    x, y = (environment.centres @ (1, 1j) for environment in (environment_i, environment_j))
+def _match_robustly(environment_i, environment_j, left_out, moved):
+    x, y = (environment.centres @ (1, 1j) / moved for environment in (environment_i, environment_j))  # sigma is 1
     # One object of each left out costs what a move of left_out costs: 2 c = left_out^2 / (2 sigma^2).
-    price = (left_out / _MOVED) ** 2 / 4
+    price = (left_out / moved) ** 2 / 4
     few = _count_partial(len(x), len(y)) <= _ENUMERATED
     partners, cost, margin, turn = (_enumerate if few else _search)(x, y, price)
     confident = bool(margin >= np.log(_ODDS))
@@ -152,10 +177,10 @@ def _costs_of(x, y, partners, price):
     matched = partners >= 0
     n = matched.sum(axis=1)
     (z, mean_z), (w, mean_w) = _centred(x * matched, matched), _centred(y[partners] * matched, matched)
-    likeness = (z.conj() * w).sum(axis=1) / _MOVED**2
+    likeness = (z.conj() * w).sum(axis=1)
     turned = np.abs(likeness + _KAPPA) - _KAPPA - _TURNED
-    spread = (np.abs(z) ** 2 + np.abs(w) ** 2).sum(axis=1) / (2 * _MOVED**2)
-    stays = np.exp(-n * np.abs(mean_w - mean_z) ** 2 / (2 * _MOVED**2))
+    spread = (np.abs(z) ** 2 + np.abs(w) ** 2).sum(axis=1) / 2
+    stays = np.exp(-n * np.abs(mean_w - mean_z) ** 2 / 2)
     left_out = price * (len(x) + len(y) - 2 * n)
     costs = spread - np.logaddexp(likeness.real, turned) - np.log(stays + np.exp(-_SHIFTED)) + left_out
     return costs + _UNMOVED, np.where(likeness.real >= turned, 0.0, np.angle(likeness + _KAPPA))
@@ -215,7 +240,7 @@ def _alignments(x, y, price):
     shifts, pivots = np.tile(shifts, 8), np.tile(pivots, 8)
     images = np.exp(1j * turns)[:, None] * (probes - pivots[:, None]) + (pivots + shifts)[:, None]
     distances, _ = cKDTree(np.c_[y.real, y.imag]).query(np.stack([images.real, images.imag], axis=-1))
-    fits = np.minimum(distances**2 / (2 * _MOVED**2), 2 * price).sum(axis=1)
+    fits = np.minimum(distances**2 / 2, 2 * price).sum(axis=1)
     chosen = np.argsort(fits, kind="stable")[:_STARTS]
     in_place = (0.0, 0.0, 0.0)
     return [in_place, *((turns[k], pivots[k], shifts[k]) for k in chosen)]
@@ -253,7 +278,7 @@ def _alignment(x, y, partners, turn):
 def _moves(x, y, turn, pivot, shift):
     """(N, M) cost of the move that each pair would need beside turn and shift, in nats."""
     images = np.exp(1j * turn) * (x - pivot) + pivot + shift
-    return np.abs(y - images[:, None]) ** 2 / (2 * _MOVED**2)
+    return np.abs(y - images[:, None]) ** 2 / 2
 
 
 def second_best(costs, partners, left_out=np.inf):

@@ -204,7 +204,8 @@ def set_apart(labels, chains):
     apart = np.zeros(len(chains.slices), bool)
     while True:
         chain_of = [labels[part] for part in chains.slices]
-        strangers = apart | (coverage_of(chain_of, path_through(graph_of(labels, chains))) < LEAST_COVERAGE)
+        path = path_through(graph_of(labels, chains), earliest(labels, chains))
+        strangers = apart | (coverage_of(chain_of, path) < LEAST_COVERAGE)
         if np.array_equal(strangers, apart):
             return labels
         apart = strangers
@@ -225,21 +226,31 @@ def numbered(labels, chains):
     return rank[labels] + FIRST
 
 
-def path_through(graph):
-    """The nodes between START and END on the most probable way through; ties: fewer states, then more subgoals in them.
+def earliest(labels, chains):
+    """The first demonstration that visits each node: (number of nodes,) for labels (M,)."""
+    first = np.full(labels.max() + 1, len(chains.slices))
+    for k, part in reversed(list(enumerate(chains.slices))):
+        first[labels[part]] = k
+    return first
+
+
+def path_through(graph, first):
+    """The nodes between START and END on the most probable way through.
 
     Probabilities are multiplied as exact fractions, so that a tie is a tie. (What the states emit stays out: a density
-    has units, and would reward or punish long paths by the choice of metres.)
+    has units, and would reward or punish long paths by the choice of metres.) Ties go to the way of fewer states, then
+    to that with more subgoals in them, then to that of the demonstration given earlier, `first` (S,) per node.
     """
-    totals, reach = graph.counts.sum(1), {START: (Fraction(1), 0, 0)}
+    totals, reach = graph.counts.sum(1), {START: (Fraction(1), 0, 0, 0)}
     came = {}
     for node in topological_order(graph.counts, np.zeros(len(totals))):
         if node not in reach:
             continue
-        probability, length, visits = reach[node]
+        probability, length, visits, lateness = reach[node]
         for successor in np.flatnonzero(graph.counts[node]).tolist():
             share = Fraction(int(graph.counts[node, successor]), int(totals[node]))
-            value = (probability * share, length - 1, visits + int(graph.n[successor]))
+            late = 0 if successor == END else int(first[successor])
+            value = (probability * share, length - 1, visits + int(graph.n[successor]), lateness - late)
             if successor not in reach or value > reach[successor]:
                 reach[successor], came[successor] = value, node
     path = [came[END]]

@@ -12,9 +12,10 @@ from dollop.cdhmm import SubgoalHMM
 from dollop.environment import Environment
 from dollop.files import FormatError, read_bytes, whole_file
 from dollop.lds import LDS, Statistics
-from dollop.matching import Matching, match
+from dollop.matching import Matching, match_confidently
 from dollop.repetition import laps
 from dollop.sequenced_lds import SequencedLDS
+from dollop.trajectory import check_trajectories
 
 FORMAT, VERSION = "dollop task", 1
 
@@ -29,13 +30,27 @@ class Demonstration:
         The walk in m; several walks of the same task in the same environment, such as laps, are one demonstration.
     environment : Environment
         The static foreground objects.
+    sample_period : float
+        Time between samples of the walk in s; the demonstrated speed depends on it.
+    tolerance : float
+        Largest mean error of a segment in m, see `SequencedLDS.fit`.
+
+    Raises
+    ------
+    ValueError
+        For what is no trajectory.
     """
 
     trajectory: np.ndarray
     environment: Environment
+    sample_period: float = 0.1
+    tolerance: float = 0.02
+
+    def __post_init__(self):
+        check_trajectories(self.trajectory)
 
     @classmethod
-    def of(cls, observation):
+    def of(cls, observation, tolerance=0.02):
         """The demonstration in an Observation: the user's laps, or the whole walk if it does not repeat itself.
 
         Raises
@@ -45,12 +60,13 @@ class Demonstration:
         """
         if observation.user is None:
             raise ValueError("a demonstration needs a user, but nobody moved")
-        return cls(laps(observation.user.t, observation.user.positions), observation.environment)
+        t, positions = observation.user.t, observation.user.positions
+        return cls(laps(t, positions), observation.environment, float(np.median(np.diff(t))), tolerance)
 
     @cached_property
     def law(self):
-        """Sequenced LDS of the walk (Sec. III), at the default tolerance."""
-        return SequencedLDS.fit(self.trajectory)
+        """Sequenced LDS of the walk (Sec. III)."""
+        return SequencedLDS.fit(self.trajectory, self.tolerance, sample_period=self.sample_period)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +82,16 @@ class Task:
     association : Association
         Ties the law's start and its K subgoals, K + 1 places, to corners of the environment.
     model : SubgoalHMM, optional
-        What several demonstrations had in common.
+        What several demonstrations had in common, in the environment in which they were learned from. It is not saved.
+    demonstrations : tuple of Demonstration
+        What the task was learned from, so that more can be added.
     """
 
     law: SequencedLDS
     environment: Environment
     association: Association
     model: SubgoalHMM = None
+    demonstrations: tuple = ()
 
     @classmethod
     def of(cls, demonstration):
@@ -82,7 +101,12 @@ class Task:
         is gone.
         """
         law, environment = demonstration.law, demonstration.environment
-        return cls(law, environment, associate(anchors(law), environment, m=len(environment.corners)))
+        association = associate(anchors(law), environment, m=len(environment.corners))
+        return cls(law, environment, association, demonstrations=(demonstration,))
+
+    def add(self, demonstration, spread=0.15):
+        """The task as `learn` has it from all demonstrations so far and one more, in this task's environment."""
+        return learn([*self.demonstrations, demonstration], self.environment, spread)
 
     def adapt(self, environment, matching=None, turned=False):
         """The task where the objects stand now: its subgoals moved, each LDS adapting by itself (Sec. IV-B).
@@ -105,7 +129,7 @@ class Task:
         ValueError
             If the environments cannot be matched with confidence; the margin is named.
         """
-        matching = matching or confident_match(self.environment, environment)
+        matching = matching or match_confidently(self.environment, environment)
         start, *subgoals = self.association.relocate(environment, matching, turned)
         law = self.law.with_subgoals(subgoals, start, turned)
         return replace(
@@ -129,11 +153,11 @@ class Task:
         """
         try:
             content = json.loads(read_bytes(path))
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise FormatError(f"not a task: {error}", path) from error
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise FormatError(f"not a task: format must be {FORMAT!r}", path)
-        if content.get("version") != VERSION:
+        if content.get("version") is not VERSION:
             raise FormatError(f"version must be {VERSION}, got {content.get('version')!r}", path)
         try:
             return from_dict(content)
@@ -146,30 +170,8 @@ def anchors(law):
     return np.vstack([law.start, law.subgoals])
 
 
-def confident_match(environment_i, environment_j, names=("the task's environment", "the new one")):
-    """The matching of two environments, or None for one object in each, which needs none.
-
-    Raises
-    ------
-    ValueError
-        If a second matching is nearly as good: then ask the user, do not guess.
-    """
-    if len(environment_i) == len(environment_j) == 1:
-        return None
-    try:
-        matching = match(environment_i, environment_j)
-    except ValueError as error:
-        raise ValueError(f"{names[0]} and {names[1]}: {error}") from error
-    if not matching.confident:
-        raise ValueError(
-            f"{names[0]} and {names[1]} cannot be matched with confidence: the second-best matching costs only "
-            f"{matching.margin:.2f} more; give the matching, or move the objects apart"
-        )
-    return matching
-
-
 def as_dict(task):
-    """The task as plain lists, for JSON. What the demonstrations had in common is not kept, only what came of it."""
+    """The task as plain lists, for JSON."""
     law, association = task.law, task.association
     segments = [
         {"goal": segment.goal.tolist()} | {name: getattr(segment.statistics, name).tolist() for name in ("G0", "G1")}
@@ -184,6 +186,15 @@ def as_dict(task):
         "speeds": law.speeds.tolist(),
         "segments": segments,
         "association": tied,
+        "demonstrations": [
+            {
+                "walks": [walk.tolist() for walk in check_trajectories(shown.trajectory)],
+                "boxes": shown.environment.boxes.tolist(),
+                "sample_period": shown.sample_period,
+                "tolerance": shown.tolerance,
+            }
+            for shown in task.demonstrations
+        ],
     }
 
 
@@ -203,7 +214,16 @@ def from_dict(content):
     )
     law = SequencedLDS(segments, np.array(content["start"], float), np.array(content["speeds"], float))
     check_shapes(law, association)
-    return Task(law, environment, association)
+    shown = tuple(
+        Demonstration(
+            [np.array(walk, float) for walk in each["walks"]],
+            Environment(np.array(each["boxes"], float)),
+            each["sample_period"],
+            each["tolerance"],
+        )
+        for each in content["demonstrations"]
+    )
+    return Task(law, environment, association, demonstrations=shown)
 
 
 def check_shapes(law, association):
@@ -220,6 +240,10 @@ def check_shapes(law, association):
     numbers = [law.start, law.speeds, law.subgoals, association.weights, association.differences]
     if not all(np.isfinite(number).all() for number in numbers):
         raise ValueError("every number must be finite")
+    if not (law.speeds > 0).all():
+        raise ValueError(f"speeds must be positive, got {law.speeds.min()}")
+    if (association.weights < 0).any():
+        raise ValueError(f"weights must not be negative, got {association.weights.min()}")
 
 
 def learn(demonstrations, environment=None, spread=0.15):
@@ -245,21 +269,31 @@ def learn(demonstrations, environment=None, spread=0.15):
     Raises
     ------
     ValueError
-        No demonstration, or one whose environment cannot be matched with confidence, named with the margin.
+        No demonstration; one whose environment cannot be matched with confidence, named with the margin; or one that
+        cannot be segmented at its tolerance.
     """
-    demonstrations = list(demonstrations)
+    demonstrations = tuple(demonstrations)
     if not demonstrations:
         raise ValueError("learning needs at least one demonstration, got none")
-    environment = environment or demonstrations[0].environment
+    check_laws(demonstrations)
+    environment = demonstrations[0].environment if environment is None else environment
     matchings = [matching_to(environment, demonstration, k) for k, demonstration in enumerate(demonstrations)]
     pairs = list(zip(demonstrations, matchings, strict=True))
     mapped = [Task.of(shown).adapt(environment, matching).law for shown, matching in pairs]
     model = SubgoalHMM.fit([law.subgoals for law in mapped], spread)
     members = members_along(model)
     association = tie_to_objects(environment, pairs, members)
-    start, *subgoals = association.relocate(environment)
-    law = shared_law(model, mapped, members).with_subgoals(subgoals, start)
-    return Task(law, environment, association, model)
+    law = shared_law(model, mapped, members, association.relocate(environment))
+    return Task(law, environment, association, model, demonstrations)
+
+
+def check_laws(demonstrations):
+    """Raise ValueError that names the demonstration that cannot be segmented."""
+    for number, demonstration in enumerate(demonstrations):
+        try:
+            demonstration.law  # noqa: B018
+        except ValueError as error:
+            raise ValueError(f"demonstration {number}: {error}") from error
 
 
 def matching_to(environment, demonstration, number):
@@ -267,7 +301,7 @@ def matching_to(environment, demonstration, number):
     n = len(environment)
     if np.array_equal(demonstration.environment.boxes, environment.boxes):
         return Matching(np.arange(4 * n), 0.0, np.inf, True)
-    return confident_match(demonstration.environment, environment, (f"demonstration {number}", "the one to learn in"))
+    return match_confidently(demonstration.environment, environment, (f"demonstration {number}", "the one to learn in"))
 
 
 def members_along(model):
@@ -276,15 +310,23 @@ def members_along(model):
     return [segments[edge] for edge in pairwise([-1, *path])]
 
 
-def shared_law(model, laws, members):
-    """One LDS for all segments that run along the same edge of the most-likely path (Sec. V)."""
-    segments, path = [], model.most_likely_path()
-    for state, shared in zip(path, members, strict=True):
-        first, *others = (laws[d].segments[i].statistics for d, i in shared)
-        segments.append(LDS.from_statistics(sum(others, first), model.means[state]))
+def shared_law(model, laws, members, places):
+    """One LDS for all segments that run along the same edge of the most-likely path (Sec. V).
+
+    Parameters
+    ----------
+    model : SubgoalHMM
+    laws : list of SequencedLDS
+        Of each demonstration.
+    members : list of K lists of (demonstration, segment)
+    places : (K + 1, 2) float array
+        Where the law is to start, and its subgoals, m.
+    """
+    pooled = model.pooled([[segment.statistics for segment in law.segments] for law in laws])
+    edges = pairwise([-1, *model.most_likely_path().tolist()])
+    segments = tuple(LDS(pooled[edge], goal) for edge, goal in zip(edges, places[1:], strict=True))
     speeds = np.array([np.mean([laws[d].speeds[i] for d, i in shared]) for shared in members])
-    start = np.mean([laws[d].start for d, _ in members[0]], axis=0)
-    return SequencedLDS(tuple(segments), start, speeds)
+    return SequencedLDS(segments, places[0], speeds)
 
 
 def tie_to_objects(environment, pairs, members):
@@ -318,7 +360,7 @@ def tie_to_objects(environment, pairs, members):
 def centres_in(environment, shown, matching):
     """Centres (N, 2) of the objects of another environment in this one's order, `nan` where there is none."""
     centres = np.full((len(environment), 2), np.nan)
-    partners = np.arange(len(shown)) if matching is None else matching.indices[::4] // 4
+    partners = matching.indices[::4] // 4
     centres[partners[partners >= 0]] = shown.centres[partners >= 0]
     return centres
 

@@ -102,6 +102,26 @@ def test_the_turn_of_a_turned_layout_is_found(angle, dx, dy):
     assert layout_turn(corners, np.c_[turned.real, turned.imag]) == pytest.approx(angle, abs=1e-9)
 
 
+def test_objects_are_told_apart_by_where_they_stand():
+    """Without a matching one is found: it does not matter in which order the objects are given."""
+    association = associate(SUBGOALS, Environment(BOXES), m=12)
+    moved = BOXES + np.array([0.2, -0.1, 0.2, -0.1])
+    np.testing.assert_allclose(
+        association.relocate(Environment(moved[[2, 0, 1]])), association.relocate(Environment(moved)), atol=1e-12
+    )
+    np.testing.assert_allclose(association.relocate(Environment(moved)), SUBGOALS + np.array([0.2, -0.1]), atol=1e-12)
+
+
+def test_weights_do_not_hang_on_rounding():
+    """Where demonstrations do not vary but by rounding, closeness alone is left."""
+    rng = np.random.default_rng(0)
+    frames, goals = Frames(rng.uniform(0, 5, (3, 2)), np.zeros(3)), rng.uniform(0, 5, (4, 2))
+    alone = associate_with_frames([goals], [frames]).weights
+    shifts = rng.uniform(-3, 3, (5, 2))
+    alike = [Frames(frames.positions + shift, frames.directions) for shift in shifts]
+    np.testing.assert_allclose(associate_with_frames([goals + shift for shift in shifts], alike).weights, alone)
+
+
 def test_bad_associations_are_refused():
     """No object, m out of range, NaN, another number of objects, a foreign matching, no corner left: errors by name."""
     environment = Environment(BOXES)
@@ -115,8 +135,11 @@ def test_bad_associations_are_refused():
         associate([[0, 0], [np.nan, 1]], environment)
     with pytest.raises(ValueError, match=r"subgoals must have the shape \(N, 2\), got \(2,\)"):
         associate([0, 0], environment)
-    with pytest.raises(ValueError, match="must stay 3, got 2"):
-        association.relocate(Environment(BOXES[:2]))
+    either_way = Environment([[0, 0, 1, 1], [3, 0, 4, 1]]), Environment([[0, 0, 1, 1], [0, 3, 1, 4]])
+    with pytest.raises(
+        ValueError, match="the associated environment and the new one cannot be matched with confidence"
+    ):
+        associate(SUBGOALS, either_way[0]).relocate(either_way[1])
     with pytest.raises(ValueError, match="from the 12 associated corners to the 8 present ones"):
         association.relocate(Environment(BOXES[:2]), _matching(np.arange(12)))
     with pytest.raises(ValueError, match="leaves out all of subgoal 0"):

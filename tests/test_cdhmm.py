@@ -197,7 +197,7 @@ def test_most_likely_path_is_the_best_of_all(seed):
         shares = [counts[u, v] / counts[u].sum() for u, v in pairwise(path)]
         return round(float(np.prod(shares)), 12), -len(path), n[list(path)].sum()
 
-    path = (START, *path_through(Graph(n, None, None, counts)).tolist(), END)
+    path = (START, *path_through(Graph(n, None, None, counts), np.zeros(len(n), int)).tolist(), END)
     assert merit(path) == max(merit(each) for each in all_paths(counts))
 
 
@@ -469,3 +469,25 @@ def test_bad_input_to_a_model_is_named():
         model.log_likelihood([])
     with pytest.raises(ValueError, match=r"one entry per segment, \[6\] by demonstration, got \[5\]"):
         model.pooled([np.zeros((5, 2, 2))])
+
+
+def test_of_equally_probable_ways_the_one_shown_first_is_taken():
+    """Two demonstrations that part and meet again: neither is better, so the first one's way is the task."""
+    first, second = [(0, 0), (2, 0), (4, 1.5), (6, 0), (8, 0)], [(0, 0), (2, 0), (4, -1.5), (6, 0), (8, 0)]
+    for shown in ([first, second], [second, first]):
+        model = SubgoalHMM.fit(shown)
+        np.testing.assert_allclose(model.means[model.most_likely_path()], shown[0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("sequence", "spread", "says"),
+    [
+        ([(0, 0), (1, 0)], 1e-100, "spread must lie between 1e-06 and 1e.06 m, got 1e-100"),
+        ([(0, 0), (1, 0)], 1e300, "spread must lie between"),
+        ([(0, 0), (1e154, 0)], 0.15, "must lie within 1e.09 m of the origin, got 1e.154 m"),
+    ],
+)
+def test_numbers_beyond_all_measure_are_refused(sequence, spread, says):
+    """What would drown the evidence in rounding is an error, not an endless search."""
+    with pytest.raises(ValueError, match=says):
+        SubgoalHMM.fit([sequence, sequence], spread)

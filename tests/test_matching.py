@@ -268,5 +268,17 @@ def test_bad_input_is_refused():
         match(two, touching, method="literal")
     with pytest.raises(ValueError, match="method must be .* got 'hungarian'"):
         match(two, two, method="hungarian")
-    with pytest.raises(ValueError, match="left_out must be positive, got 0"):
+    with pytest.raises(ValueError, match="left_out must be positive and finite, got 0"):
         match(two, three, left_out=0)
+
+
+def test_moves_are_judged_by_their_usual_size():
+    """Layouts, moves and all twice as large cost the same if objects usually move twice as far."""
+    rng = np.random.default_rng(5)
+    before, after, _ = random_layouts(3, rng)
+    twice = [Environment(2 * each.boxes) for each in (before, after)]
+    one, two = match(before, after, moved=0.4), match(*twice, left_out=6.0, moved=0.8)
+    assert (one.indices == two.indices).all()
+    np.testing.assert_allclose([two.cost, two.margin, two.turn], [one.cost, one.margin, one.turn])
+    with pytest.raises(ValueError, match="moved must be positive and finite, got -1"):
+        match(before, after, moved=-1)

@@ -20,7 +20,7 @@ from dollop.segmentation import (
     segment_errors,
 )
 from dollop.sequenced_lds import cut_moments
-from dollop.trajectory import align, distance_to_polyline, retime
+from dollop.trajectory import align, distance_to_polyline, resample, retime
 
 
 @pytest.fixture(scope="module")
@@ -107,3 +107,24 @@ def test_slow_responses_are_followed_to_the_subgoal():
     slow = Statistics(np.eye(2)[None], 0.995 * np.eye(2)[None])
     responses = candidate_responses(slow, np.array([[3.0, 4.0]]))
     assert np.linalg.norm(responses[0, -2]) < 0.05 * 5 and not responses[0, -1].any()
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.1, 2.9])
+@pytest.mark.parametrize("corners", [[[0, 0], [6, 0]], [[0, 0], [4, 0], [4, 4], [0, 4]]])
+def test_ties_do_not_hang_on_rounding(corners, angle):
+    """On straight parts, where many divisions are as good, turning and shifting the lab changes no cut."""
+    walk = resample(np.array(corners, float), 120)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    cuts = [best_segments(segment_errors(*search_input([each], 40)), 6) for each in (walk, walk @ turn + [3.1, -2.7])]
+    np.testing.assert_array_equal(*cuts)
+
+
+def test_a_candidate_is_judged_by_itself():
+    """How closely a response is looked at does not depend on the other candidates of the same length."""
+    rng = np.random.default_rng(0)
+    decays = np.array([0.5, 0.9, 0.99, 0.999])
+    each = [Statistics(np.eye(2)[None], decay * np.eye(2)[None]) for decay in decays]
+    together = Statistics(*(np.concatenate([getattr(s, name) for s in each]) for name in ("G0", "G1")))
+    x0 = rng.normal(size=(4, 2))
+    alone = [candidate_responses(s, x0[k : k + 1])[0] for k, s in enumerate(each)]
+    np.testing.assert_allclose(candidate_responses(together, x0), alone)

@@ -125,6 +125,14 @@ def damaged(change):
         (damaged(lambda c: c["segments"].pop()), "one speed per segment"),
         (damaged(lambda c: c["segments"][0].update(G0=[[1, 0], [0, 1]], G1=[[2, 0], [0, 2]])), "spectral radius"),
         (damaged(lambda c: c["boxes"].pop()), "corners must be 0 to 3"),
+        (damaged(lambda c: c.update(version=True)), "version must be 1, got True"),
+        (damaged(lambda c: c["segments"][0].update(G0=[[1, None], [0, 1]])), "must be finite"),
+        (damaged(lambda c: c["speeds"].__setitem__(0, -1.0)), "speeds must be positive, got -1"),
+        (
+            damaged(lambda c: c["association"]["weights"][0].__setitem__(0, -3.0)),
+            "weights must not be negative, got -3",
+        ),
+        (lambda content: "[" * 100_000, "not a task"),
         (damaged(lambda c: c["association"]["weights"].pop()), "association must tie"),
         (damaged(lambda c: c.update(start=[None, 1.0])), "finite"),
     ],
@@ -187,6 +195,42 @@ def test_a_wrong_demonstration_does_not_drag_the_others():
     alone, task = learn(right), learn([*right, wrong])
     assert task.model.outliers() == (3,)
     np.testing.assert_allclose(task.law.subgoals, alone.law.subgoals, atol=0.02)
+
+
+def test_one_more_demonstration_can_be_added(tmp_path):
+    """Adding one by one is learning from all, also after saving and loading, and where the objects have moved."""
+    shown = [Demonstration(eight(0.05 * k), Environment(CANS)) for k in range(3)]
+    task = Task.of(shown[0]).add(shown[1])
+    task.save(tmp_path / "task.json")
+    added, learned = Task.load(tmp_path / "task.json").add(shown[2]), learn(shown)
+    np.testing.assert_allclose(added.law.subgoals, learned.law.subgoals, atol=1e-9)
+    assert len(added.demonstrations) == 3
+    moved = Environment(CANS + [0.3, 0.1, 0.3, 0.1])
+    np.testing.assert_allclose(
+        task.adapt(moved).add(shown[2]).law.subgoals, learned.law.subgoals + [0.3, 0.1], atol=1e-6
+    )
+
+
+def test_speeds_are_those_of_the_clock():
+    """A laser of half the rate sees the same speed: every second sample, twice the period."""
+    speeds = [Demonstration(eight()[::step], Environment(CANS), 0.1 * step).law.speeds.mean() for step in (1, 2)]
+    assert speeds[1] == pytest.approx(speeds[0], rel=0.03)
+
+
+def test_what_cannot_be_segmented_is_named():
+    """The error says which demonstration cannot keep its tolerance; with a larger one it can."""
+    rough = eight() + np.random.default_rng(0).normal(0, 0.3, eight().shape)
+    with pytest.raises(ValueError, match="demonstration 1: tolerance 0.02 m cannot be kept"):
+        learn([Demonstration(eight(), Environment(CANS)), Demonstration(rough, Environment(CANS))])
+    assert Demonstration(rough, Environment(CANS), tolerance=0.5).law.segments
+    with pytest.raises(ValueError, match="must be finite"):
+        Demonstration(eight() * np.nan, Environment(CANS))
+
+
+def test_no_objects_are_no_place_to_learn_in():
+    """An environment without objects is refused, not replaced by the demonstration's."""
+    with pytest.raises(ValueError, match="at least 2 objects, got 2 and 0"):
+        learn([Demonstration(eight(), Environment(CANS))], Environment([]))
 
 
 def test_nothing_to_learn_from():
