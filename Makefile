@@ -8,6 +8,9 @@ PYTHON ?= $(shell for p in python3.11 python3 python; do \
 	"$$p" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' >/dev/null 2>&1 && { echo "$$p"; break; }; done)
 RUN := .venv/bin/python
 export MPLBACKEND := Agg
+# The matrices here are tiny: more threads only get into each other's way, and cost up to five times the time.
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 10
@@ -28,7 +31,7 @@ study: .venv/ready  ## test the paper's claims over a hundred seeds; goes on whe
 	$(RUN) -m dollop.cli study
 
 bench: .venv/ready  ## benchmarks beside plain baselines, one thread
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(RUN) -m benchmarks
+	$(RUN) -m benchmarks
 
 book: .venv/ready  ## execute the notebooks and lay them out as HTML pages in build/book
 	$(RUN) book/build.py

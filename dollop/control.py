@@ -4,12 +4,14 @@ In segment k the law maps the current state to a direction, whatever brought the
 
     u(p) = (A_k - I)(p - g_k) / |(A_k - I)(p - g_k)|.
 
-A segment stays in force until the robot is within 0.25 m of its subgoal g_k; then the next one takes over. So a robot
-that is kidnapped keeps its segment: it goes on to the subgoal it was heading for, as the user would have done from
-there, and skips none. Two control laws make v and omega of it:
+A segment stays in force until the robot has come to its subgoal g_k; then the next one takes over. So a robot that is
+kidnapped keeps its segment: it goes on to the subgoal it was heading for, as the user would have done from there. Two
+control laws make v and omega of it:
 
-- `Plain` turns towards u and drives at the demonstrated speed; it knows nothing of what the robot can do.
-- `Pursuit` rolls the response out from the current state and pursues a point ahead on it, slower where it bends.
+- `Plain` turns towards u and drives at the demonstrated speed; it knows nothing of what the robot can do. A segment
+  hands over within 0.25 m of its subgoal.
+- `Pursuit` rolls the response out from the current state and pursues a point ahead on it, slower where it bends. A
+  segment hands over where the place on the response that is nearest to the robot belongs to the next.
 
 The paper gives neither the rule of handing over nor a controller: both are reconstructions.
 """

@@ -22,7 +22,7 @@ START, END, FIRST = 0, 1, 2  # nodes of every graph: the start, the end, then th
 LEAST_GAIN = 1e-9  # nats: a smaller gain of evidence is rounding, not a reason
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chains:
     """The subgoals of all demonstrations, one after the other.
 
@@ -45,7 +45,7 @@ class Prior:
     psi: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Graph:
     """What labels add up to: per node `n` (S,), `s` (S, 2), `q` (S, 3), and edge `counts` (S, S)."""
 

@@ -251,7 +251,8 @@ def lattice(free, background):
 def moved_particles(particles, motion, rng):
     """Particles (N, 3) after a motion (3,) by odometry, each with an error of its own.
 
-    Standard deviations: 10 % of the way and 2 mm, 10 % of the turn, 3 degrees per m and 0.1 degrees.
+    Standard deviations: 10 % of the way and 2 mm along it, 5 % and 2 mm across; 10 % of the turn, 3 degrees per m
+    and 0.1 degrees.
     """
     ahead, left, turn = motion
     way = np.hypot(ahead, left)

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
 from dollop.lab.scenes import background_distance
+from dollop.trajectory import arc_length, resample
 
 SHOULDERS = 0.45
 """Width of the body across the shoulders in m."""
@@ -27,7 +28,7 @@ TIME_STEP = 0.02
 PATH_STEP = 0.02
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Walk:
     """Where the person is at which time.
 
@@ -203,14 +204,7 @@ def smooth_path(points):
 
 def evenly(path, step=PATH_STEP):
     """The path sampled again at even distances of about `step` m."""
-    arc = arc_length(path)
-    even = np.linspace(0.0, arc[-1], max(2, round(arc[-1] / step) + 1))
-    return np.column_stack([np.interp(even, arc, column) for column in path.T])
-
-
-def arc_length(path):
-    """Distance in m walked up to every point of a path."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    return resample(path, max(2, round(arc_length(path)[-1] / step) + 1))
 
 
 def normals(path):

@@ -74,7 +74,7 @@ class Kind:
 KINDS = {"trash can": Kind(0.18, 0.18, 0.66), "cone": Kind(0.13, 0.28, 1.0)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """The movable half of the laboratory: foreground objects and where the robot stands.
 
