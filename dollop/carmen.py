@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dollop.files import FormatError, forgive, longest_rise, read_bytes, usable_clock, whole_file
-from dollop.laser import LaserLog
+from dollop.laser import LaserLog, check_positive, wrapped
 
 NOMINAL_MAX_RANGE = 80.0
 """What CARMEN takes for the maximum range of a laser in a FLASER line, in m (`readlog.c`)."""
@@ -62,7 +62,7 @@ class Odometry:
     t : (N,) float array
         Time in s, increasing.
     poses : (N, 3) float array
-        Robot in the odometry's own frame: x, y in m, theta in rad.
+        Robot in the odometry's own frame: x, y in m, theta in rad, wrapped to (-pi, pi].
     velocities : (N, 2) float array
         Forward in m/s, turning in rad/s.
     """
@@ -131,6 +131,8 @@ def read_log(path, max_range=None):
     ------
     FormatError
         If the file is no CARMEN log, holds no scan, or more than a few scans are broken (`dollop.files.forgive`).
+    ValueError
+        If `max_range` is not positive and finite.
 
     Warns
     -----
@@ -138,6 +140,8 @@ def read_log(path, max_range=None):
         If broken scans were left out, if the clock is wrong (`dollop.files.usable_clock`), or if so many readings of
         FLASER messages equal the largest one that it may be a full scale that is not known here.
     """
+    if max_range is not None:
+        check_positive("max_range", max_range)
     scans, bad = _parse_scans(path)
     beams = Counter(scan.beams for scan in scans).most_common(1)[0][0]
     odd = [(s.line, f"{s.beams}, which differs from most scans' {beams}") for s in scans if s.beams != beams]
@@ -145,7 +149,7 @@ def read_log(path, max_range=None):
     scans = [scan for scan in scans if scan.beams == beams]
     keep, t = usable_clock(path, np.array([scan.t for scan in scans]))
     ranges = np.array([scans[i].ranges for i in keep])
-    limit = max_range or _no_return_from(path, ranges, beams)
+    limit = _no_return_from(path, ranges, beams) if max_range is None else max_range
     ranges = np.where((ranges >= limit - 1e-9) | (ranges == 0), np.inf, ranges)
     angles, poses = beams.start + beams.step * np.arange(beams.count), [scans[i].pose for i in keep]
     try:
@@ -216,7 +220,10 @@ _PARSERS = {b"FLASER": _parse_flaser, b"ROBOTLASER1": _parse_robotlaser}
 def _count(fields, place, least=1):
     if place >= len(fields):
         raise ValueError(f"too few numbers: {len(fields)} fields in the line, at least {place + 1} needed")
-    count = int(fields[place])
+    try:
+        count = int(fields[place])
+    except ValueError:
+        raise ValueError(f"a number of readings must be a whole number, got {_shown(fields[place])}") from None
     if count < least:
         raise ValueError(f"a number of readings must be at least {least}, got {count}")
     return count
@@ -224,12 +231,22 @@ def _count(fields, place, least=1):
 
 def _numbers(fields, first, count):
     """`count` finite numbers, from field `first` on."""
-    values = [float(field) for field in fields[first : first + count]]
+    values = []
+    try:
+        # extend and not a list: what it has taken before an error says which field is wrong.
+        values.extend(map(float, fields[first : first + count]))
+    except ValueError:
+        raise ValueError(f"expected a number, got {_shown(fields[first + len(values)])}") from None
     if len(values) < count:
         raise ValueError(f"too few numbers: {len(fields)} fields in the line, at least {first + count} needed")
     if not all(map(math.isfinite, values)):
         raise ValueError(f"every number must be finite, got {next(v for v in values if not math.isfinite(v))}")
     return values
+
+
+def _shown(field):
+    """The beginning of a field of a line, for a message."""
+    return repr(field[:20].decode("utf-8", "replace"))
 
 
 def _check_ending(fields, used):
@@ -329,6 +346,7 @@ def read_odometry(path):
     if len(keep) < len(rows):
         text = f"left out {len(rows) - len(keep)} of {len(rows)} ODOM messages, which the clock puts out of order"
         warnings.warn(f"{path}: {text}", stacklevel=2)
+    rows[:, 2] = wrapped(rows[:, 2])
     return Odometry(rows[keep, 6], rows[keep, :3], rows[keep, 3:5])
 
 

@@ -1,4 +1,4 @@
-"""Command line: dollop map, dollop observe, dollop data."""
+"""Command line: dollop map, dollop observe, dollop data, dollop study."""
 
 import argparse
 import sys
@@ -9,10 +9,12 @@ import numpy as np
 import pandas as pd
 
 from dollop import plot, study
-from dollop.files import whole_file
-from dollop.gridmap import OccupancyGrid
+from dollop.files import check_writable, whole_file
+from dollop.gridmap import OccupancyGrid, check_is_map
 from dollop.logs import read_log, write_log
 from dollop.observation import observe
+
+LEG_HEIGHT = "at leg height a walker is two small blobs: try --min-area 0.0025 --stride 0.6"
 
 
 def main(arguments=None):
@@ -28,15 +30,20 @@ def parser():
     """The commands and their arguments."""
     root = argparse.ArgumentParser(prog="dollop", description="Learning by observation with a mobile robot.")
     commands = root.add_subparsers(required=True, metavar="command")
-    build = commands.add_parser("map", help="build a background map from a laser log with known poses")
-    build.add_argument("log", help="CARMEN log (.log, .log.gz, .clf) or ROS bag")
+    log = argparse.ArgumentParser(add_help=False)
+    log.add_argument("log", help="CARMEN log (.log, .log.gz, .clf) or ROS bag")
+    log.add_argument("--topic", help="which LaserScan topic of a bag; needed only if there are several")
+    build = commands.add_parser("map", parents=[log], help="build a background map from a laser log with known poses")
     build.add_argument("map", help="what to write: .yaml (ROS map_server) or .map (CARMEN)")
     build.add_argument("--resolution", type=float, default=0.05, help="m per cell (default: 0.05)")
     build.set_defaults(run=build_map)
-    watch = commands.add_parser("observe", help="track the user in a laser log")
-    watch.add_argument("log", help="CARMEN log (.log, .log.gz, .clf) or ROS bag")
+    watch = commands.add_parser("observe", parents=[log], help="track the user in a laser log")
     watch.add_argument("map", help="background map: .yaml (ROS map_server) or .map (CARMEN)")
-    watch.add_argument("--out", default="user.csv", help="where the trajectory goes; a .png lands beside it")
+    watch.add_argument("--min-area", type=float, default=0.01, help="smallest foreground object in m^2 (default: 0.01)")
+    watch.add_argument("--stride", type=float, default=0.0, help="blobs nearer than this in m are one (default: 0)")
+    watch.add_argument(
+        "--out", default="user.csv", help="the trajectory, a .csv; a .png of the same name lands beside it"
+    )
     watch.set_defaults(run=observe_log)
     data = commands.add_parser("data", help="remake the recordings that the notebooks read")
     data.add_argument("--folder", type=Path, default=Path("data"), help="where to write (default: data)")
@@ -47,17 +54,21 @@ def parser():
 
 def build_map(options):
     """dollop map LOG MAP"""
-    OccupancyGrid.from_log(read_log(options.log), options.resolution).save(options.map)
+    check_is_map(options.map)
+    check_writable(options.map)
+    OccupancyGrid.from_log(read_log(options.log, options.topic), options.resolution).save(options.map)
     print(f"wrote {options.map}")
 
 
 def observe_log(options):
     """dollop observe LOG MAP"""
-    log, background = read_log(options.log), OccupancyGrid.load(options.map)
-    observation = observe(log, background)
-    if observation.user is None:
-        raise ValueError(f"nobody moves in {options.log}: there are {len(observation.tracks)} tracks, none is fast")
-    user, out = observation.user, Path(options.out)
+    out, picture = outputs(options)
+    log, background = read_log(options.log, options.topic), OccupancyGrid.load(options.map)
+    observation = observe(log, background, min_area=options.min_area, stride=options.stride)
+    user = observation.user
+    if user is None:
+        text = f"nobody moves in {options.log}: there are {len(observation.tracks)} tracks, none is fast"
+        raise ValueError(f"{text}; {LEG_HEIGHT}")
     columns = {"t": user.t, "x": user.positions[:, 0], "y": user.positions[:, 1], "occluded": user.occluded}
     with whole_file(out, "w") as stream:
         pd.DataFrame(columns).to_csv(stream, index=False, float_format="%.4f")
@@ -66,13 +77,25 @@ def observe_log(options):
         plot.grid_map(ax, background)
         plot.boxes(ax, observation.environment.boxes, "static objects")
         plot.path(ax, user.positions, "user")
-        plot.plane(ax).legend()
-        with whole_file(out.with_suffix(".png")) as stream:
+        plot.plane(ax).legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+        with whole_file(picture) as stream:
             figure.savefig(stream)
         plt.close(figure)
     walked = np.linalg.norm(np.diff(user.positions, axis=0), axis=1).sum()
     print(f"the user walked {walked:.1f} m in {user.t[-1] - user.t[0]:.1f} s, lost {observation.losses} times;")
-    print(f"{len(observation.environment.boxes)} static objects; wrote {out} and {out.with_suffix('.png')}")
+    print(f"{len(observation.environment.boxes)} static objects; wrote {out} and {picture}")
+
+
+def outputs(options):
+    """Paths of the trajectory and of its picture, once it is clear that both can be written and cover no input."""
+    out = Path(options.out)
+    if out.suffix != ".csv":
+        raise ValueError(f"--out must be named .csv (its picture, .png, lands beside it), got {out}")
+    if out.with_suffix("").resolve() == Path(options.map).with_suffix("").resolve():
+        raise ValueError(f"--out must have another name than the map, whose picture it may replace, got {out}")
+    for path in (out, out.with_suffix(".png")):
+        check_writable(path)
+    return out, out.with_suffix(".png")
 
 
 def record_data(options):
@@ -80,6 +103,7 @@ def record_data(options):
     from dollop import experiments
 
     options.folder.mkdir(parents=True, exist_ok=True)
+    check_writable(options.folder / "lab.yaml")
     write_log(options.folder / "empty_lab.log.gz", experiments.empty_lab())
     experiments.background_map().save(options.folder / "lab.yaml")
     recordings = {"figure_eights": experiments.figure_eights()}

@@ -1,5 +1,6 @@
 """Files at the edge: errors that name file and line, what a reader forgives, writing that is whole or not at all."""
 
+import codecs
 import gzip
 import os
 import tempfile
@@ -14,6 +15,8 @@ import numpy as np
 MAX_BYTES = 1 << 30
 NOMINAL_RATE = 10.0
 """Scans per second of a SICK LMS 200 at 1 degree and 38400 baud: what a log without a usable clock is given."""
+LONGEST_GAP = 3600.0
+"""Seconds without a scan from which on it is the clock that jumped: no log of a demonstration rests for an hour."""
 
 
 class FormatError(ValueError):
@@ -37,6 +40,8 @@ class FormatError(ValueError):
 
 def read_bytes(path):
     """Whole content of a file, unpacked where it is gzipped (told by its first two bytes, not by its name).
+
+    A byte order mark, which some editors put before UTF-8 text, is left out.
 
     Parameters
     ----------
@@ -63,22 +68,45 @@ def read_bytes(path):
         raise FormatError("the file is empty", path)
     if len(content) > MAX_BYTES:
         raise FormatError(f"holds more than {MAX_BYTES} bytes, the most that is read", path)
-    return content
+    return content.removeprefix(codecs.BOM_UTF8)
+
+
+def check_writable(path):
+    """Raise OSError now, with the file's name, if a file `path` could not be written later."""
+    path = Path(path)
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} cannot be written: it is a folder")
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise _naming(path, error) from None
 
 
 @contextmanager
 def whole_file(path, mode="wb"):
-    """Open a temporary neighbour of `path` for writing; it takes the name `path` only when all went well."""
+    """Open a temporary neighbour of `path` for writing; it takes the name `path` only when all went well.
+
+    Of two such files, one within the other, none takes its name before both are written.
+    """
     path = Path(path)
+    check_writable(path)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, mode) as stream:
             yield stream
+            stream.flush()
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
-    except BaseException:
+    except BaseException as error:
         os.unlink(temporary)
+        if isinstance(error, OSError) and error.filename in (None, temporary):
+            raise _naming(path, error) from None
         raise
+
+
+def _naming(path, error):
+    """The same error about the file that was to be written; the temporary one is nobody's concern."""
+    return type(error)(f"{path} cannot be written: {error.strerror or error}")
 
 
 def forgive(path, bad, total):
@@ -140,10 +168,12 @@ def longest_rise(values):
 
 
 def usable_clock(path, t):
-    """Decide what to do about a clock that stands still or runs backwards, and warn of it.
+    """Decide what to do about a clock that stands still, runs backwards or jumps, and warn of it.
 
-    Where at most one scan in twenty is out of order those are left out. Otherwise the clock is worthless: all scans
-    are kept, in the order of the file, and numbered at `NOMINAL_RATE`; speeds then mean nothing.
+    A scan is out of order where the clock runs backwards, and where it is farther than `LONGEST_GAP` from the scan
+    before and the scan after. Where at most one scan in twenty is out of order those are left out. Otherwise the clock
+    is worthless: all scans are kept, in the order of the file, and numbered at `NOMINAL_RATE`; speeds then mean
+    nothing. A jump forwards that lasts is only warned of: either side of it is in order.
 
     Parameters
     ----------
@@ -159,14 +189,23 @@ def usable_clock(path, t):
     t : (K,) float array
         Their times in s, strictly increasing.
     """
-    keep = longest_rise(t)
+    keep = _without_strays(t, longest_rise(t))
     lost = len(t) - len(keep)
-    if lost == 0:
-        return keep, t
     if lost * 20 <= len(t):
-        text = f"left out {lost} of {len(t)} scans, which the clock puts out of order"
-        warnings.warn(f"{path}: {text}", stacklevel=4)
+        if lost:
+            text = f"left out {lost} of {len(t)} scans, which the clock puts out of order"
+            warnings.warn(f"{path}: {text}", stacklevel=4)
+        gap = np.diff(t[keep]).max(initial=0)
+        if gap > LONGEST_GAP:
+            warnings.warn(f"{path}: the clock jumps by {gap:g} s from one scan to the next", stacklevel=4)
         return keep, t[keep]
     text = f"the clock stands still or runs backwards ({lost} of {len(t)} scans are out of order), so the scans are"
     warnings.warn(f"{path}: {text} timed at {NOMINAL_RATE:g} Hz; speeds mean nothing", stacklevel=4)
     return np.arange(len(t)), np.arange(len(t)) / NOMINAL_RATE
+
+
+def _without_strays(t, keep):
+    """`keep` (K,), increasing in `t`, without the few scans that are far from both neighbours; an end has but one."""
+    far = np.diff(t[keep], prepend=-np.inf, append=np.inf) > LONGEST_GAP
+    stray = far[:-1] & far[1:]
+    return keep if stray.sum() * 20 > len(keep) else keep[~stray]

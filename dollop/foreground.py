@@ -10,10 +10,12 @@ import numpy as np
 from scipy import ndimage
 from scipy.sparse.csgraph import connected_components
 
+from dollop.laser import check_positive
+
 EIGHT_CONNECTED = np.ones((3, 3), dtype=bool)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Blobs:
     """Foreground objects of one moment: adjacent occupied cells that envelop enough area.
 
@@ -73,10 +75,9 @@ def foreground_mask(points, background, background_radius=0.20):
     Raises
     ------
     ValueError
-        If more than a tenth of the readings lie outside the map, or the radius is not positive.
+        If more than a tenth of the readings lie outside the map, or the radius is not positive and finite.
     """
-    if not background_radius > 0:
-        raise ValueError(f"background_radius must be positive, got {background_radius}")
+    check_positive("background_radius", background_radius)
     flat = points.reshape(-1, 2)
     returned = np.isfinite(flat[:, 0])
     covered = returned.copy()
@@ -132,6 +133,8 @@ def surface_points(points, mask, spacing=0.05, jump=0.30):
 def seen_free(points, pose, angles, ranges, margin=0.0):
     """Whether the beam nearest in bearing to each point went on beyond it.
 
+    A beam stands for half a step to either side, so that a laser that looks all round has no gap where it begins.
+
     Parameters
     ----------
     points : (M, 2) float array
@@ -149,10 +152,13 @@ def seen_free(points, pose, angles, ranges, margin=0.0):
         False outside the field of view.
     """
     offset = points - pose[:2]
-    bearing = np.arctan2(offset[:, 1], offset[:, 0]) - pose[2]
-    bearing = (bearing + np.pi) % (2 * np.pi) - np.pi
-    beam = np.rint(np.interp(bearing, angles, np.arange(len(angles)), left=-1, right=-1)).astype(np.intp)
-    return (beam >= 0) & (ranges[beam] > np.hypot(offset[:, 0], offset[:, 1]) + margin)
+    # Counted from the right edge of the field of view, a bearing is the same wherever the sensor's frame has its zero.
+    step = (angles[-1] - angles[0]) / max(len(angles) - 1, 1)
+    right = angles[0] - step / 2
+    bearing = (np.arctan2(offset[:, 1], offset[:, 0]) - (pose[2] + right)) % (2 * np.pi)
+    inside = bearing <= len(angles) * step
+    beam = np.rint(np.interp(bearing, angles - right, np.arange(len(angles)))).astype(np.intp)
+    return inside & (ranges[beam] > np.hypot(offset[:, 0], offset[:, 1]) + margin)
 
 
 class ForegroundGrid:
@@ -303,9 +309,8 @@ def find_blobs(cells, resolution, min_area=0.01):
 def closed_up(index):
     """Move cells together along one axis until at most one line between them is empty: fewer cells, the same blobs."""
     order = np.argsort(index)
-    steps = np.minimum(np.diff(index[order], prepend=index[order[0]]), 2)
-    closed = np.empty_like(index)
-    closed[order] = np.cumsum(steps)
+    closed = np.zeros_like(index)
+    closed[order[1:]] = np.cumsum(np.minimum(np.diff(index[order]), 2))
     return closed
 
 

@@ -1,5 +1,7 @@
 """Occupancy grid maps: built from a laser log with known poses, read and written as ROS and CARMEN maps."""
 
+import io
+import json
 import os
 import re
 from dataclasses import dataclass
@@ -11,6 +13,7 @@ from scipy import ndimage
 
 from dollop import carmen
 from dollop.files import FormatError, read_bytes, whole_file
+from dollop.laser import check_positive
 
 OCCUPIED_FROM = 0.5
 """Probability from which a cell is occupied (CARMEN's `occupied_prob`)."""
@@ -23,6 +26,8 @@ class OccupancyGrid:
     """How likely each cell of the plane is occupied.
 
     A cell is *occupied* from a probability of 0.5 on, *free* below, and *unknown* where no beam has been.
+
+    The array is a copy, and read-only: what has been checked stays as it is.
 
     Attributes
     ----------
@@ -50,7 +55,7 @@ class OccupancyGrid:
     resolution: float
 
     def __post_init__(self):
-        object.__setattr__(self, "occupancy", np.asarray(self.occupancy, dtype=float))
+        object.__setattr__(self, "occupancy", np.array(self.occupancy, dtype=float))
         object.__setattr__(self, "origin", tuple(float(value) for value in self.origin))
         object.__setattr__(self, "resolution", float(self.resolution))
         if self.occupancy.ndim != 2 or self.occupancy.size == 0:
@@ -58,10 +63,10 @@ class OccupancyGrid:
         wrong = (self.occupancy < 0) | (self.occupancy > 1)
         if wrong.any():
             raise ValueError(f"an occupancy must be in [0, 1], or NaN where unknown, got {self.occupancy[wrong][0]}")
-        if not 0 < self.resolution < np.inf:
-            raise ValueError(f"resolution must be positive and finite, got {self.resolution}")
+        check_positive("resolution", self.resolution)
         if len(self.origin) != 2 or not np.isfinite(self.origin).all():
             raise ValueError(f"origin must be a finite x, y, got {self.origin}")
+        self.occupancy.flags.writeable = False
 
     @classmethod
     def from_log(cls, log, resolution=0.05, max_range=20.0):
@@ -88,12 +93,14 @@ class OccupancyGrid:
         Raises
         ------
         ValueError
-            If the grid would have more than 100 million cells.
+            If the grid would have more than 100 million cells, or a parameter is not positive and finite.
 
         Notes
         -----
         The counting model of D. Hähnel et al., "Map building with mobile robots in dynamic environments" (ICRA 2003).
         """
+        check_positive("resolution", resolution)
+        check_positive("max_range", max_range)
         reach = np.minimum(log.ranges, min(max_range, log.max_range))
         origin, shape = _frame(log, reach, resolution)
         hits, passes = np.zeros(np.prod(shape)), np.zeros(np.prod(shape))
@@ -107,7 +114,7 @@ class OccupancyGrid:
 
     @classmethod
     def load(cls, path):
-        """Read a ROS map_server map (`.yaml`, which names its `.pgm`) or a CARMEN map (`.map`).
+        """Read a ROS map_server map (`.yaml`, which names its picture, PGM or PNG) or a CARMEN map (`.map`).
 
         Parameters
         ----------
@@ -124,7 +131,7 @@ class OccupancyGrid:
             If the file is not what its name says.
         """
         path = Path(path)
-        _check_is_map(path)
+        check_is_map(path)
         content = carmen.read_map(path) if path.suffix == ".map" else _read_ros_map(path)
         try:
             return cls(*content)
@@ -139,10 +146,10 @@ class OccupancyGrid:
         Parameters
         ----------
         path : str or Path
-            The file; it appears whole or not at all.
+            The file; it appears whole or not at all, and the picture with it.
         """
         path = Path(path)
-        _check_is_map(path)
+        check_is_map(path)
         if path.suffix == ".map":
             carmen.write_map(path, self.occupancy, self.origin, self.resolution)
         else:
@@ -229,9 +236,12 @@ class OccupancyGrid:
 
     @cached_property
     def _distances(self):
-        if not self.occupied.any():
-            return np.full(self.occupancy.shape, np.inf)
-        return ndimage.distance_transform_edt(~self.occupied, sampling=self.resolution)
+        if self.occupied.any():
+            distances = ndimage.distance_transform_edt(~self.occupied, sampling=self.resolution)
+        else:
+            distances = np.full(self.occupancy.shape, np.inf)
+        distances.flags.writeable = False
+        return distances
 
     def distance_at(self, points):
         """Distance from the cell of each point to the nearest occupied one.
@@ -254,15 +264,14 @@ class OccupancyGrid:
         return distances
 
 
-def _check_is_map(path):
-    if path.suffix not in (".map", ".yaml", ".yml"):
+def check_is_map(path):
+    """Raise FormatError if the name is not one of a map."""
+    if Path(path).suffix not in (".map", ".yaml", ".yml"):
         raise FormatError("a map is named .yaml (ROS) or .map (CARMEN)", path)
 
 
 def _frame(log, reach, resolution):
     """Corner and shape of a grid that holds the sensor and the ends of all beams, with a cell to spare."""
-    if not (0 < resolution < np.inf):
-        raise ValueError(f"resolution must be positive and finite, got {resolution}")
     bearings = log.poses[:, 2, None] + log.angles
     x = log.poses[:, 0, None] + reach * np.cos(bearings)
     y = log.poses[:, 1, None] + reach * np.sin(bearings)
@@ -314,12 +323,13 @@ def _write_ros_map(path, grid):
     grey = np.where(grid.occupied, np.minimum(grey, UNKNOWN_GREY[0] - 1), np.maximum(grey, UNKNOWN_GREY[1] + 1))
     grey = np.where(grid.unknown, UNKNOWN_GREY[0], grey).astype(np.uint8)
     height, width = grey.shape
-    # The picture first: a YAML that is there has its picture.
-    with whole_file(image) as stream:
-        stream.write(b"P5\n%d %d\n255\n" % (width, height) + grey[::-1].tobytes())
-    with whole_file(path) as stream:
-        text = ROS_MAP.format(image=image.name, resolution=grid.resolution, origin=grid.origin)
-        stream.write(text.encode())
+    # A name that could mean something else to YAML goes in quotes, in which YAML reads what JSON writes.
+    name = image.name if re.fullmatch(r"\w[\w.-]*", image.name) else json.dumps(image.name, ensure_ascii=False)
+    text = ROS_MAP.format(image=name, resolution=grid.resolution, origin=grid.origin)
+    with whole_file(path) as stream, whole_file(image) as picture:
+        stream.write(text.encode("utf-8", "surrogateescape"))
+        stream.flush()  # so that nothing is left to fail once the picture has its name
+        picture.write(b"P5\n%d %d\n255\n" % (width, height) + grey[::-1].tobytes())
 
 
 def _read_ros_map(path):
@@ -328,44 +338,75 @@ def _read_ros_map(path):
         if key not in keys:
             raise FormatError(f"the key {key!r} is missing", path)
     resolution = _number(path, keys, "resolution")
-    origin = [_as_number(path, "origin", text) for text in keys["origin"].strip("[]").split(",")]
-    if len(origin) != 3 or origin[2] != 0:
-        raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {keys['origin']}", path)
+    origin = [_as_number(path, "origin", text) for text in _items(keys["origin"])]
+    # A millionth of a radian is a tenth of a millimetre in a hundred metres: the rounding of some other program.
+    if len(origin) != 3 or not abs(origin[2]) <= 1e-6:
+        raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {keys['origin']!r}", path)
     # os.path and not pathlib, which lets names that are too long or hold a zero byte through as other errors.
     if not os.path.isfile(path.parent / keys["image"]):
         raise FormatError(f"its picture {keys['image']!r} is missing", path)
-    grey = _read_pgm(path.parent / keys["image"])[::-1]
+    grey = _read_picture(path.parent / keys["image"])[::-1]
     return _ros_occupancy(path, keys, grey), origin[:2], resolution
 
 
 def _ros_occupancy(path, keys, grey):
     """Probabilities by the map's `mode`, set so that occupied and free cells are what the file's thresholds say."""
-    mode = keys.get("mode", "trinary")
+    mode, negate = keys.get("mode", "trinary"), keys.get("negate", "0")
+    if mode not in ("trinary", "scale", "raw"):
+        raise FormatError(f"mode must be trinary, scale or raw, got {mode!r}", path)
+    if negate.lower() not in ("0", "false", "1", "true"):
+        raise FormatError(f"negate must be 0, 1, false or true, got {negate!r}", path)
+    above, below = _number(path, keys, "occupied_thresh", 0.65), _number(path, keys, "free_thresh", 0.196)
+    if not 0 <= below <= above <= 1:
+        rule = "thresholds must be 0 <= free_thresh <= occupied_thresh <= 1"
+        raise FormatError(f"{rule}, got free_thresh {below:g} and occupied_thresh {above:g}", path)
     if mode == "raw":
         return np.where(grey <= 100, grey / 100, np.nan)
-    if mode not in ("trinary", "scale"):
-        raise FormatError(f"mode must be trinary, scale or raw, got {mode!r}", path)
-    probability = grey / 255 if keys.get("negate", "0") in ("1", "true") else (255 - grey) / 255
-    occupied = probability > _number(path, keys, "occupied_thresh", 0.65)
-    free = probability < _number(path, keys, "free_thresh", 0.196)
+    probability = (grey if negate.lower() in ("1", "true") else 255 - grey) / 255
+    occupied, free = probability > above, probability < below
     between = np.nan if mode == "trinary" else probability
-    below = np.nextafter(OCCUPIED_FROM, 0)
-    certain = np.where(occupied, np.maximum(probability, OCCUPIED_FROM), np.minimum(probability, below))
+    just_free = np.nextafter(OCCUPIED_FROM, 0)
+    certain = np.where(occupied, np.maximum(probability, OCCUPIED_FROM), np.minimum(probability, just_free))
     return np.where(occupied | free, certain, between)
 
 
 def _flat_yaml(path):
-    """The keys of a YAML file that has no nesting but a list in one line, which is all that map_server writes."""
-    keys = {}
-    for number, line in enumerate(read_bytes(path).decode("utf-8", "replace").splitlines(), 1):
-        line = re.sub(r"(^|\s)#.*", "", line).strip()
-        if not line or line == "---":
+    """Keys and values of a YAML file that has no nesting but lists, which is all that maps need; a value is text."""
+    keys, key = {}, None
+    lines = read_bytes(path).decode("utf-8", "surrogateescape").split("\n")
+    for number, line in enumerate(lines, 1):
+        entry = re.match(r"\s*(\w+)\s*:(?:\s+(.*))?$", line)
+        if entry:
+            key, keys[entry[1]] = entry[1], _scalar(path, number, entry[2] or "")
             continue
-        key, colon, value = line.partition(":")
-        if not colon:
-            raise FormatError(f"expected 'key: value', got {line[:40]!r}", path, number)
-        keys[key.strip()] = value.strip().strip("\"'")
+        text = _scalar(path, number, line)
+        if not text or text in ("---", "..."):
+            continue
+        if key is None or not (line[0] in " \t-" or keys[key].startswith("[")):
+            raise FormatError(f"expected 'key: value', got {text[:40]!r}", path, number)
+        keys[key] = f"{keys[key]} {text}".strip()
     return keys
+
+
+def _scalar(path, number, text):
+    """A value of YAML without its comment and its quotes."""
+    text = text.strip()
+    quoted = re.match(r"""("(?:\\.|[^"\\])*"|'(?:''|[^'])*')\s*(?:#.*)?$""", text)
+    if not quoted:
+        return re.sub(r"(^|\s)#.*", "", text).strip()
+    if text.startswith("'"):
+        return quoted[1][1:-1].replace("''", "'")
+    # JSON reads what stands in double quotes, but for YAML's \xE9, which is its \u00E9.
+    text = re.sub(r"\\(x?)(.)", lambda m: rf"\u00{m[2]}" if m[1] else m[0], quoted[1])
+    try:
+        return json.loads(text, strict=False)
+    except ValueError:
+        raise FormatError(f"quotes that cannot be read: {quoted[1][:40]!r}", path, number) from None
+
+
+def _items(text):
+    """The items of a list of numbers, written in brackets or with a dash before each."""
+    return re.split(r"(?:^|\s)-\s", text)[1:] if text.startswith("- ") else text.strip("[]").split(",")
 
 
 def _number(path, keys, key, default=None):
@@ -379,12 +420,31 @@ def _as_number(path, key, text):
         raise FormatError(f"{key} must be a number, got {text!r}", path) from None
 
 
-def _read_pgm(path):
-    """Grey values (H, W) of a binary (P5) or plain (P2) PGM of at most 255 steps, scaled to 255."""
+def _read_picture(path):
+    """Grey values (H, W) from 0 to 255 of a PGM or PNG picture, told by its content."""
     content = read_bytes(path)
+    return _png(path, content) if content.startswith(b"\x89PNG") else _pgm(path, content)
+
+
+def _png(path, content):
+    """The mean of the colours, as in map_server; a transparent pixel has no meaning in a map."""
+    from matplotlib.image import imread  # not needed, and slow to import, for any other map
+
+    try:
+        pixels = np.atleast_3d(imread(io.BytesIO(content), format="png"))
+    except Exception as error:  # Pillow meets a broken picture with whatever its parsers happen to raise
+        raise FormatError(f"not a readable PNG picture ({error})", path) from None
+    colours = 1 if pixels.shape[2] < 3 else 3
+    if (pixels[..., colours:] < 1).any():
+        raise FormatError("a map must have no transparent pixels", path)
+    return np.rint(255 * pixels[..., :colours].mean(axis=2))
+
+
+def _pgm(path, content):
+    """Grey values (H, W) of a binary (P5) or plain (P2) PGM of at most 255 steps, scaled to 255."""
     head = re.match(rb"(P[25])(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)\s", content)
     if not head:
-        raise FormatError("not a PGM picture (P5 or P2)", path)
+        raise FormatError("neither a PNG nor a PGM picture (P5 or P2)", path)
     width, height, steps = (int(number) for number in head.groups()[1:])
     if not (width > 0 and height > 0 and 0 < steps <= 255):
         raise FormatError(f"a PGM of {width} x {height} pixels and {steps} steps, expected up to 255 steps", path)

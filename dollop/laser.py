@@ -9,6 +9,8 @@ import numpy as np
 class LaserLog:
     """Scans of one planar laser, with the sensor's pose at each.
 
+    The arrays are copies, and read-only: what has been checked stays as it is.
+
     Attributes
     ----------
     t : (T,) float array
@@ -18,7 +20,7 @@ class LaserLog:
     angles : (B,) float array
         Bearing of each beam in the sensor's frame in rad, beam 0 rightmost.
     poses : (T, 3) float array
-        Sensor in the world: x, y in m, theta in rad.
+        Sensor in the world: x, y in m, theta in rad, wrapped to (-pi, pi].
     max_range : float
         The farthest range the sensor can report, in m.
 
@@ -42,14 +44,16 @@ class LaserLog:
 
     def __post_init__(self):
         for field in fields(self)[:-1]:
-            object.__setattr__(self, field.name, np.asarray(getattr(self, field.name), dtype=float))
+            object.__setattr__(self, field.name, np.array(getattr(self, field.name), dtype=float))
         object.__setattr__(self, "max_range", float(self.max_range))
         self._check_shapes()
         _check_increasing("t", self.t)
         _check_increasing("angles", self.angles)
-        if not 0 < self.max_range < np.inf:
-            raise ValueError(f"max_range must be positive and finite, got {self.max_range}")
+        check_positive("max_range", self.max_range)
         self._check_values()
+        self.poses[:, 2] = wrapped(self.poses[:, 2])
+        for field in fields(self)[:-1]:
+            getattr(self, field.name).flags.writeable = False
 
     def __len__(self):
         return len(self.t)
@@ -70,6 +74,19 @@ class LaserLog:
             scan, beam = np.argwhere(wrong)[0]
             rule = f"a range must be in [0, max_range = {self.max_range:g}], or inf where nothing came back"
             raise ValueError(f"{rule}; got {self.ranges[scan, beam]} in scan {scan}, beam {beam}")
+
+
+def check_positive(name, value, or_zero=False):
+    """Raise ValueError for a number that is negative, infinite or NaN, or zero unless that is allowed."""
+    if not (0 < value < np.inf or (or_zero and value == 0)):
+        raise ValueError(
+            f"{name} must be {'finite and not negative' if or_zero else 'positive and finite'}, got {value}"
+        )
+
+
+def wrapped(angles):
+    """Angles in rad, an array, in (-pi, pi]; those that are there already keep their last bit."""
+    return np.where((angles > -np.pi) & (angles <= np.pi), angles, np.pi - (np.pi - angles) % (2 * np.pi))
 
 
 def _check_increasing(name, values):

@@ -16,7 +16,8 @@ def read_log(path, topic=None):
     ----------
     path : str or Path
         `.log`, `.log.gz`, `.clf`: a CARMEN log (`dollop.carmen.read_log`); `.bag`, `.mcap` or the folder of a ROS 2
-        bag: a ROS bag (`dollop.rosbag.read_log`, which needs the extra `ros`).
+        bag: a ROS bag (`dollop.rosbag.read_log`, which needs the extra `ros`). A bag's poses are all (0, 0, 0): if the
+        sensor moved, give the log its poses in the map with `dataclasses.replace(log, poses=poses)`.
     topic : str, optional
         Which topic of a ROS bag; needed only if several carry laser scans.
 

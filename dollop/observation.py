@@ -13,6 +13,7 @@ from dollop.foreground import (
     seen_free,
     surface_points,
 )
+from dollop.laser import check_positive
 from dollop.tracking import Track, Tracker, identify_user, track_objects, user_track
 
 STATIC_EVERY = 5
@@ -84,6 +85,8 @@ def observe(
     ValueError
         If the map does not cover the scans or a parameter is out of its range.
     """
+    check_positive("min_area", min_area, or_zero=True)
+    check_positive("stride", stride, or_zero=True)
     tracker = tracker or Tracker()
     moving, static = ForegroundGrid(background, gain), ForegroundGrid(background, static_gain)
     objects = []

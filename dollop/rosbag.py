@@ -1,5 +1,6 @@
 """Laser scans from ROS 1 and ROS 2 bags, through rosbags (the extra `ros`)."""
 
+import warnings
 from collections import Counter
 from pathlib import Path
 
@@ -9,13 +10,15 @@ from dollop.files import FormatError, forgive, usable_clock
 from dollop.laser import LaserLog
 
 SCAN_TYPE = "sensor_msgs/msg/LaserScan"
+MOTION_TYPE = "nav_msgs/msg/Odometry"
 
 
 def read_log(path, topic=None):
     """Laser scans of one topic of a ROS 1 bag (`.bag`), a ROS 2 bag (its folder), or a single `.mcap` or `.db3` file.
 
     The poses are all (0, 0, 0): a bag says where the laser is by a tree of transforms, of which only a localisation can
-    make a pose in the world, so the laser is taken to stand still at the origin. Ranges outside [range_min, range_max]
+    make a pose in the world, so the laser is taken to stand still at the origin. If it moved, give the log the poses
+    that your localisation found: `dataclasses.replace(log, poses=poses)`. Ranges outside [range_min, range_max]
     and NaN become `inf`, as REP 117 (https://www.ros.org/reps/rep-0117.html) has it that they are no measurements.
     The time is that of the message's header.
 
@@ -40,7 +43,8 @@ def read_log(path, topic=None):
     Warns
     -----
     UserWarning
-        If broken scans were left out, or if the clock is wrong (`dollop.files.usable_clock`).
+        If broken scans were left out, if the clock is wrong (`dollop.files.usable_clock`), or if the bag holds odometry
+        or moving transforms (`/tf`), so that the robot may have moved.
     """
     try:
         from rosbags.highlevel import AnyReader
@@ -50,10 +54,18 @@ def read_log(path, topic=None):
     try:
         with AnyReader([Path(path)], default_typestore=get_typestore(Stores.LATEST)) as bag:
             scans = _messages(path, bag, topic)
+            moving = sorted(
+                {c.topic for c in bag.connections if c.msgtype == MOTION_TYPE or c.topic.strip("/") == "tf"}
+            )
     except FormatError:
         raise
     except Exception as error:  # rosbags meets a broken file with whatever its parsers happen to raise
         raise FormatError(f"not a readable ROS bag ({error or type(error).__name__})", path) from None
+    if moving:
+        text = (
+            f"{', '.join(moving)} of the bag is not read and every pose is (0, 0, 0); if the robot moved, set the poses"
+        )
+        warnings.warn(f"{path}: {text} with dataclasses.replace(log, poses=poses)", stacklevel=3)
     return _log(path, scans)
 
 

@@ -165,7 +165,8 @@ BAD_LINES = {
     "must be finite, got nan": GOOD_LINE.replace("2.0", "nan", 1),
     "must be finite, got inf": GOOD_LINE.replace("2.0", "inf", 1),
     "must not be negative, got -2.0": GOOD_LINE.replace("2.0", "-2.0", 1),
-    "could not convert string to float": GOOD_LINE.replace("2.0", "two", 1),
+    "expected a number, got 'two'": GOOD_LINE.replace("2.0", "two", 1),
+    "must be a whole number, got '3.5'": GOOD_LINE.replace("FLASER 3", "FLASER 3.5"),
     "must be at least 1, got -3": GOOD_LINE.replace("FLASER 3", "FLASER -3"),
     "differs from most": flaser((1.0, 2.0, 3.0, 4.0), t=99.0),
 }
@@ -190,6 +191,19 @@ def test_one_bad_line_in_a_short_log(tmp_path, message):
     lines.insert(1, BAD_LINES[message])
     with pytest.raises(FormatError, match=r"a\.log, line 2: "):
         carmen.read_log(write(tmp_path / "a.log", lines))
+
+
+def test_a_byte_order_mark_costs_no_scan(tmp_path):
+    """The first message counts also where an editor put a mark before it."""
+    (tmp_path / "a.log").write_text("\n".join(flasers(30)), encoding="utf-8-sig")
+    assert len(carmen.read_log(tmp_path / "a.log")) == 30
+
+
+@pytest.mark.parametrize("max_range", [0, -1.0, np.nan, np.inf])
+def test_max_range_out_of_range_is_named(tmp_path, max_range):
+    """The error names the value and the rule."""
+    with pytest.raises(ValueError, match=f"max_range must be positive and finite, got {max_range}"):
+        carmen.read_log(write(tmp_path / "a.log", flasers(3)), max_range=max_range)
 
 
 def test_cut_off_log_loses_its_last_line(tmp_path):
@@ -273,8 +287,8 @@ def test_damaged_files_never_fail_in_the_depth(tmp_path, kind, edits, zipped):
 
 
 def test_odometry(tmp_path):
-    """ODOM gives time, pose and velocity; a message out of order is left out with a warning."""
-    lines = [f"ODOM {i} {2 * i} 0.5 0.3 0.1 0 {i / 10} host 0" for i in range(30)]
+    """ODOM gives time, pose with wrapped heading, and velocity; a message out of order is left out with a warning."""
+    lines = [f"ODOM {i} {2 * i} {0.5 + 2 * np.pi} 0.3 0.1 0 {i / 10} host 0" for i in range(30)]
     lines.insert(5, "ODOM 7 7 7 0 0 0 0.0 host 0")
     with pytest.warns(UserWarning, match="left out 1 of 31 ODOM messages"):
         odometry = carmen.read_odometry(write(tmp_path / "a.log", lines))

@@ -1,5 +1,7 @@
 """Files at the edge: reading safely, forgiving little, writing whole or not at all."""
 
+import codecs
+import errno
 import gzip
 import warnings
 from itertools import combinations
@@ -10,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dollop import files
-from dollop.files import FormatError, forgive, longest_rise, read_bytes, usable_clock, whole_file
+from dollop.files import FormatError, check_writable, forgive, longest_rise, read_bytes, usable_clock, whole_file
 
 
 def test_error_names_file_and_line():
@@ -39,6 +41,33 @@ def test_whole_file_replaces(tmp_path):
         stream.write(b"new")
     assert path.read_text() == "new"
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+@pytest.mark.parametrize(("name", "kind"), [("none/a.txt", FileNotFoundError), ("folder", IsADirectoryError)])
+def test_what_cannot_be_written_is_named(tmp_path, name, kind):
+    """Before the work and while writing, the error names the target, never a temporary file, and leaves nothing."""
+    (tmp_path / "folder").mkdir()
+    for write in (check_writable, lambda path: whole_file(path).__enter__()):
+        with pytest.raises(kind) as caught:
+            write(tmp_path / name)
+        assert str(caught.value).startswith(f"{tmp_path / name} cannot be written: ") and "/." not in str(caught.value)
+    assert [p.name for p in tmp_path.iterdir()] == ["folder"] and check_writable(tmp_path / "a.txt") is None
+
+
+def test_a_full_disk_is_told_with_the_name(tmp_path):
+    """An error of writing has no name of its own, and gets the target's; one about another file keeps its own."""
+    with pytest.raises(OSError, match=r"a\.txt cannot be written: No space left"), whole_file(tmp_path / "a.txt"):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    with pytest.raises(FileNotFoundError, match="other"), whole_file(tmp_path / "a.txt"):
+        (tmp_path / "other").read_bytes()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_byte_order_mark_is_left_out(tmp_path):
+    """What an editor put before the text is no part of it, packed or not."""
+    (tmp_path / "a").write_bytes(codecs.BOM_UTF8 + b"text")
+    (tmp_path / "b").write_bytes(gzip.compress(codecs.BOM_UTF8 + b"text"))
+    assert read_bytes(tmp_path / "a") == read_bytes(tmp_path / "b") == b"text"
 
 
 def test_gzip_is_told_by_content(tmp_path):
@@ -111,6 +140,25 @@ def test_a_stray_time_costs_one_scan():
     with pytest.warns(UserWarning, match="left out 1 of 100 scans"):
         keep, kept = usable_clock("a.log", t)
     assert len(keep) == 99 and 3 not in keep and np.all(np.diff(kept) > 0)
+
+
+@pytest.mark.parametrize(("stray", "time"), [(99, 1e300), (0, -1e6), (50, 1e6), (50, -1e6)])
+def test_a_scan_far_from_both_neighbours_is_left_out(stray, time):
+    """Forwards or backwards, within the log or at its end: one such scan takes only itself away."""
+    t = np.arange(100) * 0.1
+    t[stray] = time
+    with pytest.warns(UserWarning, match="left out 1 of 100 scans, which the clock puts out of order") as record:
+        keep, kept = usable_clock("a.log", t)
+    assert keep.tolist() == [i for i in range(100) if i != stray] and np.array_equal(kept, t[keep])
+    assert len(record) == 1
+
+
+def test_a_lasting_jump_is_told():
+    """A clock that is set forwards for good leaves every scan in order, with a warning of the jump."""
+    t = np.arange(100) * 0.1 + 1e6 * (np.arange(100) >= 50)
+    with pytest.warns(UserWarning, match="the clock jumps by 1e.06 s") as record:
+        keep, kept = usable_clock("a.log", t)
+    assert len(keep) == 100 and np.array_equal(kept, t) and len(record) == 1
 
 
 @pytest.mark.parametrize("t", [np.zeros(50), -np.arange(50.0), np.tile(np.arange(25.0), 2)])

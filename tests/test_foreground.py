@@ -9,6 +9,7 @@ from dollop.foreground import (
     ForegroundGrid,
     blob_centroids,
     bounding_boxes,
+    closed_up,
     endpoints,
     find_blobs,
     foreground_mask,
@@ -64,10 +65,10 @@ def test_a_map_that_does_not_cover_the_scans_is_refused():
         foreground_mask(points, room())
 
 
-@pytest.mark.parametrize("radius", [0.0, -0.2, np.nan])
+@pytest.mark.parametrize("radius", [0.0, -0.2, np.nan, np.inf])
 def test_background_radius_must_be_positive(radius):
-    """The error names the value."""
-    with pytest.raises(ValueError, match=f"background_radius must be positive, got {radius}"):
+    """The error names the value and the rule."""
+    with pytest.raises(ValueError, match=f"background_radius must be positive and finite, got {radius}"):
         foreground_mask(np.full((1, 1, 2), 4.0), room(), radius)
 
 
@@ -128,6 +129,24 @@ def test_seen_free_knows_beam_range_and_field_of_view():
     np.testing.assert_array_equal(free, [True, False, False, True])
 
 
+@given(st.floats(-10, 10), st.booleans())
+def test_the_sensors_frame_has_no_favourite_zero(turn, all_round):
+    """Bearings counted from elsewhere, with the pose turned back as much, leave what is seen as it was."""
+    angles = np.radians(np.arange(0.0, 360.0)) if all_round else ANGLES
+    rng, pose = np.random.default_rng(0), np.array([4.0, 4.0, 0.3])
+    points, ranges = rng.uniform(0, 8, (200, 2)), rng.uniform(0, 6, len(angles))
+    expected = seen_free(points, pose, angles, ranges)
+    np.testing.assert_array_equal(seen_free(points, pose - [0, 0, turn], angles + turn, ranges), expected)
+    assert 20 < expected.sum() < 180
+
+
+def test_a_laser_that_looks_all_round_has_no_gap():
+    """Between its last beam and its first, each stands for its half."""
+    bearings = np.linspace(-np.pi, np.pi, 1000)
+    points = np.column_stack([np.cos(bearings), np.sin(bearings)])
+    assert seen_free(points, np.zeros(3), np.radians(np.arange(0.0, 360.0, 4.0)), np.full(90, 2.0)).all()
+
+
 cells = st.sets(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=40)
 
 
@@ -153,6 +172,17 @@ def test_blobs_are_the_connected_components(occupied):
         centroid = blob_centroids(blobs.cells, blobs.labels, np.zeros(2), 0.05)[k]
         np.testing.assert_allclose(centroid, 0.05 * (inside.mean(axis=0)[::-1] + 0.5))
         assert blobs.areas[k] == pytest.approx(len(inside) * 0.0025)
+
+
+@given(st.lists(st.integers(0, 60), min_size=1, max_size=30))
+def test_closed_up_keeps_who_is_beside_whom(index):
+    """Lines stay equal, neighbouring or apart as they were, and at most one in two is empty."""
+    index = np.array(index)
+    closed = closed_up(index)
+    np.testing.assert_array_equal(
+        np.minimum(np.abs(closed[:, None] - closed), 2), np.minimum(np.abs(index[:, None] - index), 2)
+    )
+    assert closed.min() == 0 and np.diff(np.sort(closed)).max(initial=0) <= 2
 
 
 def test_min_area_is_a_hundred_square_centimetres():

@@ -1,5 +1,6 @@
 """Occupancy grids: built from logs, measured, written and read."""
 
+import io
 import os
 import tempfile
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from PIL import Image
 
 from dollop.files import FormatError
 from dollop.gridmap import OccupancyGrid
@@ -90,8 +92,25 @@ def test_oversized_grid_is_refused():
     """A pose astray far enough to ask for billions of cells is an error with the size, not a crash."""
     with pytest.raises(ValueError, match="are more than 100000000"):
         OccupancyGrid.from_log(room_log([(0, 0, 0), (1, 1, 0)]), resolution=1e-5)
-    with pytest.raises(ValueError, match="resolution must be positive and finite, got 0"):
-        OccupancyGrid.from_log(room_log([(0, 0, 0)]), resolution=0)
+
+
+@pytest.mark.parametrize("name", ["resolution", "max_range"])
+@pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf])
+def test_parameters_out_of_range_are_named(name, value):
+    """The error names the parameter, the value and the rule."""
+    with pytest.raises(ValueError, match=f"{name} must be positive and finite, got {value}"):
+        OccupancyGrid.from_log(room_log([(0, 0, 0)]), **{name: value})
+
+
+def test_what_was_checked_stays():
+    """The cells are a read-only copy, and so is the distance field that belongs to them."""
+    cells = np.array([[0.0, 1.0]])
+    grid = OccupancyGrid(cells, (0.0, 0.0), 0.05)
+    cells[0, 0] = -7
+    assert grid.occupancy[0, 0] == 0.0
+    for array in (grid.occupancy, grid.distance_field()):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = 1.0
 
 
 GRIDS = hnp.arrays(
@@ -190,6 +209,8 @@ def test_map_server_map(tmp_path):
     ("old", "new", "occupied"),
     [
         ("negate: 0", "negate: 1", [[True, False, False], [False, True, True]]),
+        ("negate: 0", "negate: True", [[True, False, False], [False, True, True]]),
+        ("negate: 0", "negate: FALSE", [[False, False, True], [True, False, False]]),
         ("0.65", "0.5", [[False, True, True], [True, False, False]]),
         ("free_thresh", "mode: scale\nfree_thresh", [[False, True, True], [True, False, False]]),
         ("free_thresh", "mode: raw\nfree_thresh", [[False, True, True], [False, False, False]]),
@@ -198,6 +219,84 @@ def test_map_server_map(tmp_path):
 def test_map_server_options(tmp_path, old, new, occupied):
     """Negation, thresholds and modes mean what map_server says."""
     assert load_ros(tmp_path, MAP_SERVER.replace(old, new)).occupied.tolist() == occupied
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "origin:\n- -10.0\n- 5.5\n- 0.0",  # as PyYAML dumps it
+        "origin:\n  - -10.0  # x\n  - 5.5\n\n  - 1e-9",
+        "origin: [-10.0,\n  5.5, 0.0]",
+        "origin: [-10.0,\n5.5,\n0.0\n]",
+        "origin: [-10.0, 5.5, -1.0e-9]\r",
+    ],
+)
+def test_lists_of_yaml(tmp_path, origin):
+    """An origin is read however YAML lays out its three numbers, and a heading of a rounding error is none."""
+    text = MAP_SERVER.replace("origin: [-10.0, 5.5, 0.000000]  # x, y, yaw", origin)
+    assert load_ros(tmp_path, text).origin == (-10.0, 5.5)
+
+
+@pytest.mark.parametrize(
+    "name", ["my room #2", " room", "bob's", 'a "b" #c', "- a", "b: c", "caf\u00e9", "\\", "\n", "%x"]
+)
+def test_every_name_reads_back(tmp_path, name):
+    """Whatever the map is called, its YAML names the picture beside it."""
+    OccupancyGrid([[0.0, 1.0]], (0.0, 0.0), 0.05).save(tmp_path / f"{name}.yaml")
+    assert OccupancyGrid.load(tmp_path / f"{name}.yaml").occupied.tolist() == [[False, True]]
+
+
+@pytest.mark.parametrize(
+    "image",
+    ["'floor #1.pgm'", '"floor #1.pgm"  # the first', '"floor \\u00231.pgm"', '"floor \\x231.pgm"', "floor\n  #1.pgm"],
+)
+def test_names_in_yaml(tmp_path, image):
+    """A name in either kind of quotes is what stands between them; only outside does # begin a comment."""
+    (tmp_path / "floor #1.pgm").write_bytes(PGM)
+    text = MAP_SERVER.replace('"floor.pgm"', image)
+    if image.startswith("floor"):
+        with pytest.raises(FormatError, match="its picture 'floor' is missing"):
+            load_ros(tmp_path, text)
+    else:
+        assert load_ros(tmp_path, text).occupancy.shape == (2, 3)
+
+
+@pytest.mark.parametrize("mode", ["L", "1", "P", "LA", "RGB", "RGBA", "I;16"])
+def test_png_maps(tmp_path, mode):
+    """A PNG of any colour mode is the same map as the PGM; see-through pixels and broken files are refused."""
+    grey = np.array([[0, 255, 255], [255, 0, 0]], np.uint8)
+    picture = Image.fromarray(grey.astype(np.uint16) * 257) if mode == "I;16" else Image.fromarray(grey).convert(mode)
+    packed = io.BytesIO()
+    picture.save(packed, "png")
+    grid = load_ros(tmp_path, picture=packed.getvalue())
+    np.testing.assert_array_equal(
+        grid.occupancy, load_ros(tmp_path, picture=b"P5 3 2 255\n" + grey.tobytes()).occupancy
+    )
+    with pytest.raises(FormatError, match=r"floor\.pgm: not a readable PNG"):
+        load_ros(tmp_path, picture=packed.getvalue()[:40])
+    if mode == "RGBA":
+        picture.putpixel((1, 1), (0, 0, 0, 0))
+        picture.save(tmp_path / "clear.png")
+        with pytest.raises(FormatError, match="no transparent pixels"):
+            load_ros(tmp_path, picture=(tmp_path / "clear.png").read_bytes())
+
+
+def test_a_map_is_replaced_whole(tmp_path):
+    """If the YAML cannot be written, the picture stays as it was."""
+    (tmp_path / "a.yaml").mkdir()
+    (tmp_path / "a.pgm").write_bytes(PGM)
+    with pytest.raises(IsADirectoryError, match=r"a\.yaml cannot be written"):
+        OccupancyGrid([[0.0, 1.0]], (0.0, 0.0), 0.05).save(tmp_path / "a.yaml")
+    assert (tmp_path / "a.pgm").read_bytes() == PGM and len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_map_is_replaced_only_when_both_files_are_written(tmp_path):
+    """If the picture cannot be written, the YAML stays as it was."""
+    (tmp_path / "a.pgm").mkdir()
+    (tmp_path / "a.yaml").write_text("old")
+    with pytest.raises(IsADirectoryError, match=r"a\.pgm cannot be written"):
+        OccupancyGrid([[0.0, 1.0]], (0.0, 0.0), 0.05).save(tmp_path / "a.yaml")
+    assert (tmp_path / "a.yaml").read_text() == "old" and len(list(tmp_path.iterdir())) == 2
 
 
 def test_plain_pgm(tmp_path):
@@ -215,10 +314,18 @@ def test_plain_pgm(tmp_path):
         (MAP_SERVER.replace("0.000000", "0.3"), PGM, r"a turned map is not supported"),
         (MAP_SERVER.replace("5.5, ", ""), PGM, r"origin must be \[x, y, 0\]"),
         (MAP_SERVER.replace("5.5", "nan"), PGM, "origin must be"),
+        (MAP_SERVER.replace("0.000000", "nan"), PGM, "a turned map is not supported"),
+        (MAP_SERVER.replace("negate: 0", "negate: yes"), PGM, "negate must be 0, 1, false or true, got 'yes'"),
+        (MAP_SERVER.replace("negate: 0", "negate:"), PGM, "negate must be 0, 1, false or true, got ''"),
+        (MAP_SERVER.replace("0.65", "nan"), PGM, "free_thresh 0.196 and occupied_thresh nan"),
+        (MAP_SERVER.replace("0.65", "5"), PGM, "<= 1, got free_thresh 0.196 and occupied_thresh 5"),
+        (MAP_SERVER.replace("0.65", "0.1"), PGM, "free_thresh 0.196 and occupied_thresh 0.1"),
+        (MAP_SERVER.replace("0.196", "-1"), PGM, "got free_thresh -1"),
+        (MAP_SERVER.replace('"floor.pgm"', '"\\x"'), PGM, "line 2: quotes that cannot be read"),
         (MAP_SERVER + "mode: best\n", PGM, "mode must be trinary, scale or raw, got 'best'"),
         (MAP_SERVER + "nonsense\n", PGM, "line 8: expected 'key: value', got 'nonsense'"),
         (MAP_SERVER, PGM[:-1], "5 pixels"),
-        (MAP_SERVER, b"P6 3 2 255\n" + bytes(18), "not a PGM picture"),
+        (MAP_SERVER, b"P6 3 2 255\n" + bytes(18), "neither a PNG nor a PGM picture"),
         (MAP_SERVER, b"P5 0 2 255\n", "a PGM of 0 x 2"),
         (MAP_SERVER, b"P2 1 1 5\nx", "no number"),
         (MAP_SERVER, b"P2 1 1 5\n7", "from 7 to 7, expected 0 to 5"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dollop.laser import LaserLog
+from dollop.laser import LaserLog, check_positive
 
 GOOD = {
     "t": [0.0, 0.1],
@@ -19,6 +19,28 @@ def test_lists_become_float_arrays():
     log = LaserLog(**GOOD)
     assert len(log) == 2
     assert all(getattr(log, name).dtype == float for name in ("t", "ranges", "angles", "poses"))
+
+
+def test_what_was_checked_stays():
+    """The arrays are read-only copies: neither the log's nor the caller's own can change the log afterwards."""
+    ranges = np.array(GOOD["ranges"])
+    log = LaserLog(**(GOOD | {"ranges": ranges}))
+    ranges[0, 0] = -7
+    assert log.ranges[0, 0] == 1.0
+    for name in ("t", "ranges", "angles", "poses"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(log, name)[0] = 0
+
+
+def test_headings_are_wrapped():
+    """Theta is in (-pi, pi] whatever the file counted, and to the last bit the same if it was there before."""
+    theta = np.array([-3 * np.pi, -np.pi, -1.1, 0.3, np.pi, 4.0, 100.0])
+    poses = np.column_stack([theta, theta, theta])
+    log = LaserLog(np.arange(7), np.ones((7, 1)), [0.0], poses, 8.0)
+    wrapped = log.poses[:, 2]
+    assert ((wrapped > -np.pi) & (wrapped <= np.pi)).all() and np.array_equal(wrapped[2:5], theta[2:5])
+    np.testing.assert_allclose(np.exp(1j * wrapped), np.exp(1j * theta), atol=1e-12)
+    np.testing.assert_array_equal(log.poses[:, :2], poses[:, :2])
 
 
 @pytest.mark.parametrize(
@@ -46,3 +68,15 @@ def test_bad_values_are_named(name, value, message):
     """What does not fit is refused with the value and the rule."""
     with pytest.raises(ValueError, match=message):
         LaserLog(**(GOOD | {name: value}))
+
+
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf, -np.inf])
+def test_numbers_out_of_range_are_named(value):
+    """The error names the value and the rule; zero passes where it may."""
+    with pytest.raises(ValueError, match=f"side must be positive and finite, got {value}"):
+        check_positive("side", value)
+    with pytest.raises(ValueError, match=f"side must be finite and not negative, got {value}"):
+        check_positive("side", value, or_zero=True)
+    with pytest.raises(ValueError, match="side must be positive and finite, got 0"):
+        check_positive("side", 0)
+    check_positive("side", 0, or_zero=True)

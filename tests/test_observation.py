@@ -97,6 +97,24 @@ def test_observing_leaves_the_log_as_it_was(recording, background):
     np.testing.assert_array_equal(recording.log.poses, before[1])
 
 
+@pytest.mark.parametrize("turn", [3 * np.pi / 2, np.pi, -2.0])
+def test_the_way_a_laser_counts_its_bearings_does_not_matter(recording, background, observation, turn):
+    """From 0 to 2 pi, offset by pi or by anything: the same scans give the same tracks, user and objects."""
+    log = replace(recording.log, angles=recording.log.angles + turn, poses=recording.log.poses - [0, 0, turn])
+    turned = observe(log, background)
+    assert len(turned.tracks) == len(observation.tracks)
+    np.testing.assert_allclose(turned.user.positions, observation.user.positions, atol=1e-6)
+    np.testing.assert_allclose(turned.environment.boxes, observation.environment.boxes, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["min_area", "stride", "background_radius", "gain", "static_gain"])
+@pytest.mark.parametrize("value", [-1.0, np.nan])
+def test_parameters_out_of_range_are_named(recording, background, name, value):
+    """The error names the parameter, or the gain that it is, and the value."""
+    with pytest.raises(ValueError, match=f"{name.replace('static_', '')} must .*, got {value}"):
+        observe(recording.log, background, **{name: value})
+
+
 def test_a_map_elsewhere_is_refused(recording, background):
     """A map that does not cover the scans is an error with the share of readings outside."""
     elsewhere = OccupancyGrid(background.occupancy, np.array([50.0, 50.0]), background.resolution)

@@ -31,8 +31,8 @@ def scans_of(store, ranges=RANGES, step=0.5, count=3):
         yield types[SCAN](header, -1.0, -1.0 + step * (len(ranges) - 1), step, 0.0, 0.1, 0.1, 8.0, values, none)
 
 
-def write_bag(path, version, topics):
-    """A bag with the given messages per topic, in ROS `version` ("1", "2" or "mcap")."""
+def write_bag(path, version, topics, beside=None):
+    """A bag of the given scans per topic, in ROS `version` ("1", "2" or "mcap"), and maybe another (topic, type)."""
     store = get_typestore(Stores.ROS1_NOETIC if version == "1" else Stores.ROS2_HUMBLE)
     plugin = StoragePlugin.MCAP if version == "mcap" else StoragePlugin.SQLITE3
     with Writer1(path) if version == "1" else Writer2(path, version=8, storage_plugin=plugin) as bag:
@@ -41,6 +41,8 @@ def write_bag(path, version, topics):
             connection = bag.add_connection(topic, SCAN, typestore=store)
             for i, message in enumerate(messages(store)):
                 bag.write(connection, i * 100_000_000, bytes(serialize(message, SCAN)))
+        if beside:
+            bag.add_connection(*beside, typestore=store)
     return path
 
 
@@ -78,6 +80,21 @@ def test_topics_are_listed(tmp_path):
     with pytest.raises(FormatError, match="no LaserScan topic '/scan'; the bag has /left, /right"):
         read_log(path, topic="/scan")
     assert read_log(path, topic="/right").ranges.tolist() == [[4.0]] * 3
+
+
+TRANSFORMS = "tf2_msgs/msg/TFMessage"
+
+
+@pytest.mark.parametrize(
+    ("topic", "kind", "warns"),
+    [("/odom", "nav_msgs/msg/Odometry", True), ("/tf", TRANSFORMS, True), ("/tf_static", TRANSFORMS, False)],
+)
+def test_a_bag_of_a_robot_that_may_have_moved(tmp_path, topic, kind, warns, recwarn):
+    """Odometry or moving transforms give a warning that the poses are none and how to set them; a fixed mount none."""
+    assert not read_log(write_bag(tmp_path / "folder", "2", {"/scan": scans_of}, (topic, kind))).poses.any()
+    said = [str(warning.message) for warning in recwarn]
+    assert len(said) == warns
+    assert all(f"{topic} of the bag is not read and every pose is (0, 0, 0)" in s and "poses=poses" in s for s in said)
 
 
 def test_one_odd_scan_is_left_out(tmp_path):
