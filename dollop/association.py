@@ -17,11 +17,11 @@ all objects: in both cases closeness alone is left.
 """
 
 from dataclasses import dataclass
-from math import pi
 
 import numpy as np
 
 from dollop.environment import Environment
+from dollop.laser import wrapped
 from dollop.matching import match_confidently
 
 _EPSILON = 0.05**2  # m²: corners are not known better than to a cell of the foreground grid
@@ -207,12 +207,7 @@ class Frames:
         if not np.isfinite(directions).all():
             raise ValueError(f"directions must be finite, got {directions.tolist()}")
         object.__setattr__(self, "positions", positions)
-        object.__setattr__(self, "directions", pi - (pi - directions) % (2 * pi))
-
-    @classmethod
-    def of(cls, environment):
-        """The boxes of an environment as frames: their centres, all of direction 0, for a laser sees no direction."""
-        return cls(environment.centres, np.zeros(len(environment)))
+        object.__setattr__(self, "directions", wrapped(directions))
 
     def __len__(self):
         return len(self.positions)

@@ -5,6 +5,7 @@ A trajectory is an (N, d) array of positions in m in the order they were visited
 
 import numpy as np
 
+ROUNDS = 3  # how often walks are laid onto their mean: then it hardly changes any more
 FARTHEST = 1e9  # m from the origin: coordinates beyond are no metres, and their squares would overflow
 
 
@@ -195,7 +196,7 @@ def distance_to_polyline(points, polyline):
     return np.sqrt(((offsets - along[..., None] * edges) ** 2).sum(axis=2).min(axis=1))
 
 
-def align(trajectories, n=200, rounds=3):
+def align(trajectories, n=200):
     """Several walks along one curve, sampled where they belong together.
 
     Equal shares of arc length drift apart where one walk swings wider than another. So each walk is laid onto the mean
@@ -207,8 +208,6 @@ def align(trajectories, n=200, rounds=3):
         Positions in m; all start and end at corresponding places.
     n : int
         Number of samples.
-    rounds : int
-        How often the walks are laid onto their mean; 0 keeps equal shares of arc length.
 
     Returns
     -------
@@ -221,14 +220,16 @@ def align(trajectories, n=200, rounds=3):
     share = np.tile(np.linspace(0, 1, n), (len(walks), 1))
     aligned = np.stack([resample(walk, n) for walk in walks])
     fine = np.stack([resample(walk, 2 * n - 1) for walk in walks]) if len(walks) > 1 else None
-    for _ in range(rounds if len(walks) > 1 else 0):
+    for _ in range(ROUNDS if len(walks) > 1 else 0):
         share = monotone_warp(resample(aligned.mean(axis=0), n), fine)
         aligned = np.stack([at_arc_length(w, s * arc_length(w)[-1]) for w, s in zip(walks, share, strict=True)])
     return aligned, share
 
 
-def monotone_warp(reference, walks, slip=1.0):
+def monotone_warp(reference, walks):
     """Lay walks monotonically onto a reference, both sampled at equal distances.
+
+    What is least is the sum of squared distances and of squared slips along the path per step.
 
     Parameters
     ----------
@@ -236,8 +237,6 @@ def monotone_warp(reference, walks, slip=1.0):
         m.
     walks : (K, 2 n - 1, d) float array
         m, sampled twice as finely, so that a walk may lag or lead by half steps, at most twice as fast.
-    slip : float
-        Weight of the squared slip along the path per step beside the squared distance.
 
     Returns
     -------
@@ -246,7 +245,7 @@ def monotone_warp(reference, walks, slip=1.0):
     """
     n, fine = len(reference), walks.shape[1]
     step = np.linalg.norm(np.diff(walks, axis=1), axis=2).mean(axis=1)
-    penalty = slip * (step[:, None] * (np.arange(5) - 2)) ** 2  # five moves: 0 to 4 fine steps
+    penalty = (step[:, None] * (np.arange(5) - 2)) ** 2  # five moves: 0 to 4 fine steps
     best = np.full((len(walks), fine + 4), np.inf)
     best[:, 4] = 0.0
     moves = np.empty((n, len(walks), fine), int)
@@ -260,19 +259,19 @@ def monotone_warp(reference, walks, slip=1.0):
     return at / (fine - 1)
 
 
-def mean_trajectory(trajectories, n=200, rounds=3):
+def mean_trajectory(trajectories, n=200):
     """The mean of several walks along one curve.
 
     Parameters
     ----------
     trajectories : (N, 2) array_like or sequence of (N_k, 2) array_like
         Positions in m; all start and end at corresponding places.
-    n, rounds : int
-        As in `align`.
+    n : int
+        Number of samples.
 
     Returns
     -------
     (n, 2) float array
         m, at equal distances.
     """
-    return resample(align(trajectories, n, rounds)[0].mean(axis=0), n)
+    return resample(align(trajectories, n)[0].mean(axis=0), n)

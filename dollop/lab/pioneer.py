@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dollop.control import wrap
 from dollop.lab.world import PHYSICS_RATE, pybullet
 
 URDF = Path(__file__).with_name("pioneer2dx.urdf")
@@ -135,12 +136,7 @@ def moved_pose(pose, distance, turn):
     """
     x, y, theta = pose
     middle = theta + turn / 2
-    return np.array([x + distance * np.cos(middle), y + distance * np.sin(middle), wrapped(theta + turn)])
-
-
-def wrapped(angle):
-    """The angle in rad within (-pi, pi]."""
-    return np.pi - (np.pi - angle) % (2 * np.pi)
+    return np.array([x + distance * np.cos(middle), y + distance * np.sin(middle), wrap(theta + turn)])
 
 
 def laser_pose(pose):

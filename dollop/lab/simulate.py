@@ -3,8 +3,9 @@
 import numpy as np
 import pandas as pd
 
+from dollop.control import wrap
 from dollop.lab import person
-from dollop.lab.pioneer import Pioneer, laser_pose, wrapped
+from dollop.lab.pioneer import Pioneer, laser_pose
 from dollop.lab.recording import TRUTH_COLUMNS, Recording
 from dollop.lab.scenes import empty_scene, figure_eight_scene
 from dollop.lab.sick import SickLMS200
@@ -55,7 +56,7 @@ def record(scene, walk, seed, sick=None, legs=False):
             world.place_person(*state)
             ranges.append(sick.scan(world, pose, rng))
     log = LaserLog(t, np.array(ranges), sick.angles, np.tile(pose, (len(t), 1)), sick.max_range)
-    rows = [(time, *position, wrapped(heading)) for time, (position, heading, _) in zip(t, states, strict=True)]
+    rows = [(time, *position, wrap(heading)) for time, (position, heading, _) in zip(t, states, strict=True)]
     return Recording(log, pd.DataFrame(rows, columns=TRUTH_COLUMNS), scene)
 
 
@@ -107,7 +108,7 @@ def record_figure_eights(seed, laps=5, scene=None, sick=None, legs=False, **gait
     return record(scene, person.figure_eight(scene, walking, laps, **gait), sensing, sick, legs)
 
 
-def record_background(seed, sick=None, tour=TOUR):
+def record_background(seed, sick=None):
     """Drive the robot through the empty laboratory and log the laser with true poses, for a background map.
 
     Parameters
@@ -115,8 +116,6 @@ def record_background(seed, sick=None, tour=TOUR):
     seed : int or numpy.random.Generator
         For the laser's noise.
     sick : SickLMS200, optional
-    tour : (K, 2) array
-        Way-points in m.
 
     Returns
     -------
@@ -127,7 +126,7 @@ def record_background(seed, sick=None, tour=TOUR):
     poses, ranges = [], []
     with World(scene) as world:
         robot = Pioneer(world, scene.robot)
-        for goal in np.asarray(tour):
+        for goal in np.asarray(TOUR):
             while np.linalg.norm(goal - robot.pose[:2]) > 0.3:
                 poses.append(laser_pose(robot.pose))
                 ranges.append(sick.scan(world, poses[-1], rng))
@@ -140,5 +139,5 @@ def record_background(seed, sick=None, tour=TOUR):
 def pursue(pose, goal, speed=0.5, gain=1.5):
     """Speed in m/s and turning rate in rad/s towards a goal (2,), slower the farther it lies off the heading."""
     x, y, theta = pose
-    error = wrapped(np.arctan2(goal[1] - y, goal[0] - x) - theta)
+    error = wrap(np.arctan2(goal[1] - y, goal[0] - x) - theta)
     return speed * max(np.cos(error), 0.0) ** 2, gain * error
