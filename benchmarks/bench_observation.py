@@ -32,11 +32,12 @@ def plain_observe(log, background, gains=(0.6, 0.1)):
         for grid, gain in zip(grids, gains, strict=True):
             grid[touched] += gain * (hit[touched] - grid[touched])
         labels, count = ndimage.label(grids[0].reshape(shape) > 0.5, np.ones((3, 3)))
-        sizes = ndimage.sum_labels(np.ones(shape), labels, np.arange(1, count + 1))
-        large = 1 + np.flatnonzero(sizes >= 4)
+        sizes, seen = (
+            ndimage.sum_labels(cells, labels, np.arange(1, count + 1)) for cells in (np.ones(shape), hit.reshape(shape))
+        )
+        large = 1 + np.flatnonzero((sizes >= 4) & (seen > 0))
         found = ndimage.center_of_mass(hit.reshape(shape), labels, large) if len(large) else []
-        found = np.array(found).reshape(-1, 2)[:, ::-1]
-        objects.append(background.origin + background.resolution * (found[np.isfinite(found[:, 0])] + 0.5))
+        objects.append(background.origin + background.resolution * (np.array(found).reshape(-1, 2)[:, ::-1] + 0.5))
     tracks = track_objects(log.t, objects)
     return user_track(log.t, tracks, identify_user(log.t, tracks))
 
