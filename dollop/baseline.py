@@ -101,17 +101,23 @@ def gaussian_hmm(sequences, left_to_right=False, n_states=range(2, 11), restarts
     (L, 2) float array
         In m.
     """
+    from threadpoolctl import threadpool_limits
+
     points, lengths = np.concatenate(sequences), [len(sequence) for sequence in sequences]
     random = np.random.RandomState(seed)
     sizes = [size for size in n_states if size <= len(points)]
-    models = [_fitted(size, left_to_right, random, points, lengths, spread) for size in sizes for _ in range(restarts)]
-    scores = [np.inf if model is None else model.bic(points, lengths) for model in models]
-    model = models[int(np.nanargmin(scores))]
-    return model.means_[list(_common_path(model, sequences))]
+    blank = [_blank(size, left_to_right, random, spread) for size in sizes for _ in range(restarts)]
+    # Matrices this small are slower with several BLAS threads, many times so where these wait for a busy processor.
+    # Only what is loaded is limited: hmmlearn is, by now.
+    with threadpool_limits(1):
+        models = [_fitted(model, points, lengths) for model in blank]
+        scores = [np.inf if model is None else model.bic(points, lengths) for model in models]
+        model = models[int(np.nanargmin(scores))]
+        return model.means_[list(_common_path(model, sequences))]
 
 
-def _fitted(size, left_to_right, random, points, lengths, spread):
-    """One run of expectation-maximisation, or None where it broke down."""
+def _blank(size, left_to_right, random, spread):
+    """A hidden Markov model that has seen nothing yet."""
     from hmmlearn.hmm import GaussianHMM
 
     logging.getLogger("hmmlearn").setLevel(logging.ERROR)  # it warns of every run that stops early
@@ -129,6 +135,11 @@ def _fitted(size, left_to_right, random, points, lengths, spread):
     if left_to_right:
         model.startprob_ = np.eye(size)[0]
         model.transmat_ = allowed / allowed.sum(1, keepdims=True)
+    return model
+
+
+def _fitted(model, points, lengths):
+    """The model after one run of expectation-maximisation, or None where that broke down."""
     try:
         with np.errstate(all="ignore"):
             return model.fit(points, lengths)

@@ -103,8 +103,6 @@ class LDS:
     def A(self):
         return self.statistics.matrix
 
-    from_statistics = classmethod(lambda cls, statistics, goal: cls(statistics, goal))  # TEMPORARY
-
     @classmethod
     def fit(cls, trajectories, retimed=True):
         """Fit one LDS to one or several trajectories by least squares in closed form (Sec. III).

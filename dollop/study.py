@@ -2,7 +2,7 @@
 
 Results go into one tidy table, study/results.csv: a row per claim, seed and number. It is replaced whole after every
 seed that is done, so that an interrupted study goes on where it was. From the table come claims.json, and with it the
-table of claims in REPLICATION.md.
+table of claims in REPLICATION.md; and study/golden.json, the numbers of one seed that any machine must find again.
 """
 
 import json
@@ -28,6 +28,9 @@ ATTEMPTS = 3
 
 PATIENCE = 300.0
 """On a cluster, after so many s without a seed finished a worker counts as dead: joblib's Dask backend is silent."""
+
+GOLDEN = {"seed": 0, "relative_tolerance": 0.02, "absolute_tolerance": 0.001}
+"""Another machine must find the numbers of this seed within these: linear algebra differs in the last digits."""
 
 BEGIN, END = "<!-- claims: begin -->", "<!-- claims: end -->"
 
@@ -225,12 +228,13 @@ def summary(claim, rows):
         "seeds": int(rows.seed.nunique()),
         "numbers": numbers,
         "verdict": verdict([each["met"] for each in numbers if each["met"]]),
+        "by_construction": claim.constructed,
     }
 
 
 def measured(criterion, values):
     """One number over the seeds: mean, interval, what is wanted, whether that is met, and the band; open ends None."""
-    mean, low, high = interval(values, criterion.share)
+    mean, low, high = interval(values, criterion.trials == 1)
     wanted = criterion.wanted
     return {
         "number": criterion.number,
@@ -281,10 +285,24 @@ def claims_table(found):
         numbers = "<br>".join(f"{n['meaning']}: {amount(n)}" for n in claim["numbers"])
         wanted = "<br>".join(wish(n["wanted"]) for n in claim["numbers"])
         quote = f"“{claim['quote']}”"
-        lines.append(
-            f"| `{claim['id']}` | {claim['section']} | {quote} | {numbers} | {wanted} | **{claim['verdict']}** |"
-        )
+        verdict = f"**{claim['verdict']}**" + (", by construction" if claim["by_construction"] else "")
+        lines.append(f"| `{claim['id']}` | {claim['section']} | {quote} | {numbers} | {wanted} | {verdict} |")
     return "\n".join(lines)
+
+
+def golden_numbers(table):
+    """The numbers of the golden seed by claim, None for nan, times left out; with the seed and the tolerances."""
+    rows = table[table.seed == GOLDEN["seed"]].set_index(["claim", "number"]).value
+    numbers = {
+        id: {
+            each.number: float(rows[id, each.number]) if isfinite(rows[id, each.number]) else None
+            for each in claim.criteria
+            if not each.timed
+        }
+        for id, claim in CLAIMS.items()
+        if id in rows.index
+    }
+    return {"parameters": GOLDEN, "numbers": {id: found for id, found in numbers.items() if found}}
 
 
 def amount(number):
@@ -342,7 +360,7 @@ def command(options):
     except KeyboardInterrupt:
         sys.exit(f"dollop: stopped; what was done is in {folder / 'results.csv'}, the same command goes on from there")
     found = summaries(table)
-    report(found, folder)
+    report(found, table, folder)
 
 
 def check_writable(folder):
@@ -354,19 +372,25 @@ def check_writable(folder):
         raise OSError(f"the folder {folder} cannot be written to: {error}") from error
 
 
-def report(found, folder):
-    """Write claims.json: into a quick study's folder, or beside REPLICATION.md, whose table of claims it then is."""
+def report(found, table, folder):
+    """Write claims.json: into a quick study's folder, or beside REPLICATION.md, whose table of claims it then is.
+
+    Beside REPLICATION.md, the golden numbers are written as well.
+    """
     for claim in found:
         print(f"{claim['id']:17}{claim['verdict']:15}{claim['seeds']:4} seeds")
     replication = folder.parent / "REPLICATION.md"
     full = folder.name == "study" and replication.exists()
-    written = [(folder.parent if full else folder) / "claims.json"]
-    with whole_file(written[0], "w") as stream:
-        json.dump(found, stream, indent=1, ensure_ascii=False)
-        stream.write("\n")
+    written = {(folder.parent if full else folder) / "claims.json": as_json(found)}
     if full:
-        text = put_between_marks(replication.read_text(), claims_table(found))
-        with whole_file(replication, "w") as stream:
+        written[replication] = put_between_marks(replication.read_text(), claims_table(found))
+        written[folder / "golden.json"] = as_json(golden_numbers(table))
+    for path, text in written.items():
+        with whole_file(path, "w") as stream:
             stream.write(text)
-        written.append(replication)
     print(f"wrote {', '.join(map(str, [folder / 'results.csv', *written]))}")
+
+
+def as_json(content):
+    """Content as JSON, a line per entry."""
+    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"

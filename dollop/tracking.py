@@ -364,8 +364,9 @@ def smooth_backwards(filtered, predicted, F):
 def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):
     """Which track is the user at each moment: the fastest foreground object (Sec. II), with hysteresis.
 
-    Occluded objects keep their velocity, so only visible ones count as fast; and another one takes over only after
-    it has been faster by `faster` m/s for `patience` s, or the choice would flicker between ghosts.
+    Occluded objects keep their velocity, so only visible ones can become the user; who is the user already stays as
+    fast while out of sight. Another one takes over only after it has been faster by `faster` m/s for `patience` s, or
+    the choice would flicker.
 
     Parameters
     ----------
@@ -385,15 +386,15 @@ def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):
     (T,) int array
         Index into `tracks`, -1 while nobody has moved yet.
     """
-    speed = np.zeros((len(t), len(tracks)))
+    speed, seen = np.zeros((2, len(t), len(tracks) + 1))  # the last column is nobody's, for -1
     for k, track in enumerate(tracks):
         rows = np.searchsorted(t, track.t)
-        speed[rows, k] = np.where(track.occluded | (track.t - track.t[0] < min_age), 0.0, track.speeds)
+        speed[rows, k] = np.where(track.t - track.t[0] < min_age, 0.0, track.speeds)
+        seen[rows, k] = np.where(track.occluded, 0.0, speed[rows, k])
     user, since, rival = -1, np.inf, -1
     users = np.empty(len(t), int)
-    fastest = speed.argmax(axis=1) if len(tracks) else np.full(len(t), -1)
-    for i, best in enumerate(fastest):
-        leads = best >= 0 and best != user and speed[i, best] > faster + (speed[i, user] if user >= 0 else 0.0)
+    for i, best in enumerate(seen.argmax(axis=1)):
+        leads = best != user and seen[i, best] > faster + speed[i, user]
         if not leads or best != rival:
             since, rival = (t[i], best) if leads else (np.inf, -1)
         elif t[i] - since >= patience:
