@@ -7,7 +7,6 @@ one writes a PNG per panel, keeps the numbers in metrics.json, and lays both out
 import argparse
 import json
 import sys
-import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -18,7 +17,7 @@ from dollop import figures_learning as learning
 from dollop import figures_observing as observing
 from dollop import figures_performing as performing
 from dollop import gallery, plot
-from dollop.files import whole_file
+from dollop.files import check_writable, whole_file
 
 FIGURES = {
     "1": observing.figure_1,
@@ -73,12 +72,12 @@ def main(arguments=None):
     unknown = [panel for panel in options.ids if panel not in FIGURES]
     if unknown:
         parser.error(f"no figure {', '.join(unknown)}; known: {', '.join(FIGURES)}")
+    written = options.folder / "metrics.json"
     try:
         options.folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=options.folder).close()
+        check_writable(written)
     except OSError as error:
         parser.error(f"the folder {options.folder} cannot be written to: {error}")
-    written = options.folder / "metrics.json"
     metrics = json.loads(written.read_text()) if written.exists() else {}
     panels = options.ids or list(FIGURES)
     try:

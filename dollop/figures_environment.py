@@ -4,37 +4,45 @@ from string import ascii_lowercase
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.patches import ConnectionPatch
 
 from dollop import experiments, plot
-from dollop.environment import spring_constants, spring_forces
+from dollop.environment import Environment, spring_constants, spring_forces
+from dollop.figures_performing import CONTROLS, at_once, draw_runs, least_clearance
 from dollop.layouts import matching_shares
 from dollop.matching import match
 
-NEAR = 0.45  # m, how far a label stands off its corner in the drawing
+NEAR = 0.11  # m, how far a label stands off its corner in the drawing
+ASIDE = 1.0, -2.2  # m, by which Fig. 8 draws the boxes of now aside, so that no two lines lie on each other
+WIDE = 10  # inches, figures of three panels
 
 
 def figure_8():
-    """Eight corners on the left, matched to eight on the right: the paper's literal cost, and the robust matching."""
+    """Eight corners above, matched to eight below: the paper's literal cost, and the robust matching."""
     before, after = experiments.figure_eight_task().environment, experiments.moved_environment(0)
     literal, robust = match(before, after, method="literal"), match(before, after)
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.4), sharex=True, sharey=True)
-    figure.get_layout_engine().set(w_pad=0.1)
-    for ax, environment, names in zip(axes, (before, after), ("12345678", ascii_lowercase[:8]), strict=True):
-        plot.boxes(ax, environment.boxes)
-        label_corners(ax, environment, names)
-        plot.plane(ax)
-    axes[0].set(xlim=(1.2, 7.8), ylim=(1.4, 5.4), title="as demonstrated")
-    axes[1].set(title="now", ylabel="")
-    for matching, line, colour in ((literal, "--", plot.OCCLUDED), (robust, "-", plot.LAW)):
+    aside = Environment(after.boxes + np.tile(ASIDE, 2))
+    figure, ax = plt.subplots(figsize=(8, 5.4))
+    for method, matching, look in (
+        ("robust", robust, {"linewidth": 2.5, "alpha": 0.7}),
+        ("literal", literal, {"linewidth": 1.5, "linestyle": (0, (4, 3))}),
+    ):
+        label = {"literal": "literal (the paper's cost)", "robust": "robust (the default)"}[method]
         for a, b in enumerate(matching.indices):
-            ends = before.corners[a], after.corners[b]
-            figure.add_artist(
-                ConnectionPatch(*ends, "data", "data", axesA=axes[0], axesB=axes[1], color=colour, ls=line)
-            )
-    styles = {"literal (the paper's cost)": (plot.OCCLUDED, "--"), "robust (the default)": (plot.LAW, "-")}
-    lines = [plt.Line2D([], [], color=colour, ls=line, label=name) for name, (colour, line) in styles.items()]
-    figure.legend(handles=lines, loc="outside lower center", ncols=2)
+            ends = before.corners[a], aside.corners[b]
+            plot.path(ax, ends, None if a else label, plot.METHODS[method], **look)
+    for environment, names, up, words in (  # names stand beside their corners, a little up or down, clear of the lines
+        (before, "12345678", (-0.05, 0.04, 0.04, 0.05), "as demonstrated"),
+        (aside, ascii_lowercase[:8], (-0.05, -0.04, -0.04, 0.03), "now"),
+    ):
+        plot.boxes(ax, environment.boxes)
+        away = np.column_stack([NEAR * outwards(environment)[:, 0], np.tile(up, 2)])
+        label_corners(ax, environment, names, away)
+        ax.text(*environment.centres.mean(axis=0), words, ha="center", fontsize=11, style="italic")
+    ax.plot([2.2, 3.2], [0.6, 0.6], "|-", color="black", linewidth=1)
+    ax.text(2.7, 0.65, "1 m", ha="center", va="bottom")
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    plot.legend_below(figure, ax)
     return figure, {
         "indices": robust.indices.tolist(),
         "cost": robust.cost,
@@ -45,87 +53,113 @@ def figure_8():
     }
 
 
-def label_corners(ax, environment, names):
-    """Write a name beside each corner, away from the middle of its box."""
-    middles = np.repeat(environment.centres, 4, axis=0)
-    for corner, middle, name in zip(environment.corners, middles, names, strict=True):
-        away = corner + (corner - middle) * NEAR / np.linalg.norm(corner - middle)
-        ax.text(*away, name, ha="center", va="center", fontsize=11)
-    ax.plot(*environment.corners.T, "o", color=plot.SUBGOAL, markersize=4)
+def outwards(environment):
+    """For each corner (4N, 2) which way along x and y leads out of its box: +1 or -1."""
+    return np.sign(environment.corners - np.repeat(environment.centres, 4, axis=0))
+
+
+def label_corners(ax, environment, names, away):
+    """A dot at each corner, and its name `away` (4N, 2) from it, in m."""
+    for place, name in zip(environment.corners + away, names, strict=True):
+        ax.text(*place, name, ha="center", va="center", fontsize=11, zorder=7, path_effects=[plot.HALO])
+    ax.plot(*environment.corners.T, "o", color="black", markersize=4, zorder=6)
 
 
 def figure_9():
-    """The springs between eight corners, thick where they are strong, and the force on each corner."""
+    """The springs between eight corners, wide where they are strong, and enlarged the force on each corner of a box."""
     environment = experiments.figure_eight_task().environment
     corners = environment.corners
-    constants, forces = spring_constants(corners), spring_forces(corners)
-    figure, axes = plt.subplots(1, 2, figsize=(11, 3.2), width_ratios=(2.2, 1))
-    for ax in axes:
-        for m in range(len(corners)):
-            for n in range(m):
-                width = 0.5 + 1.5 * np.log10(constants[m, n] / constants[constants > 0].min())
-                ax.plot(*corners[[m, n]].T, color=plot.USER, linewidth=width, alpha=0.5, zorder=1)
-        ax.quiver(*corners.T, *forces.T, color=plot.OBSTACLE, angles="xy", scale_units="xy", scale=110, zorder=5)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.2), width_ratios=(3, 1))
+    for ax in (left, right):
+        draw_springs(ax, corners)
         plot.plane(ax)
-    label_corners(axes[0], environment, "12345678")
-    low, high = corners.min(axis=0) - 0.7, corners.max(axis=0) + 0.7
-    axes[0].set(
-        xlim=(low[0], high[0]), ylim=(low[1], high[1]), title="springs, wider where stronger, and forces (arrows)"
-    )
+    label_corners(left, environment, "12345678", NEAR * outwards(environment))
+    low, high = corners.min(axis=0) - 0.35, corners.max(axis=0) + 0.35
+    left.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title="springs, wider where stronger")
+    arrows = {"angles": "xy", "scale_units": "xy", "scale": 110, "width": 0.015}
+    right.quiver(*corners.T, *spring_forces(corners).T, color=plot.FORCE, zorder=5, **arrows)
     middle = environment.centres[environment.centres[:, 0].argmin()]
-    axes[1].set(xlim=middle[0] + [-0.55, 0.55], ylim=middle[1] + [-0.55, 0.55], title="one box, enlarged")
+    right.set(xlim=middle[0] + [-0.3, 0.3], ylim=middle[1] + [-0.3, 0.3], title="one box, with the forces", ylabel="")
     matching = match(environment, experiments.moved_environment(0), method="literal")
     return figure, {"indices": matching.indices.tolist(), "cost": matching.cost, "margin": matching.margin}
+
+
+def draw_springs(ax, corners):
+    """A line for every two corners; its width grows with the logarithm of the spring constant."""
+    constants = spring_constants(corners)
+    for m in range(len(corners)):
+        for n in range(m):
+            width = 0.5 + 1.5 * np.log10(constants[m, n] / constants[constants > 0].min())
+            ax.plot(*corners[[m, n]].T, color=plot.SPRING, linewidth=width, alpha=0.6, zorder=1)
 
 
 def figure_10a():
     """Moved obstacles, as the robot's laser sees them, and the subgoals that moved with them."""
     task, grid = experiments.figure_eight_task(), experiments.background_map()
-    figure, axes = plt.subplots(1, len(experiments.LAYOUTS), figsize=(13, 4.5), sharey=True)
+    figure, axes = plt.subplots(1, len(experiments.LAYOUTS), figsize=(WIDE, 3), sharey=True)
     right = []
     for k, ax in enumerate(axes):
         adapted = experiments.adapted_task(k)
-        plot.workspace(grid, experiments.moved_scene(k).robot, adapted.environment.boxes, ax)
-        plot.boxes(ax, task.environment.boxes, "obstacles before", "black", linestyle=":", linewidth=1)
-        plot.path(ax, adapted.law.response(), "control law", plot.LAW, linewidth=2)
-        ax.plot(*task.law.subgoals.T, "x", color=plot.TRUTH, markeredgewidth=2, label="subgoals before")
+        plot.workspace(grid, experiments.moved_scene(k).robot, adapted.environment.boxes, ax, f"layout {k + 1}")
+        plot.boxes(ax, task.environment.boxes, "obstacles before", plot.BACKGROUND, linestyle=":", linewidth=1.5)
+        plot.law(ax, adapted.law.response())
+        ax.plot(*task.law.subgoals.T, "x", color=plot.BACKGROUND, markeredgewidth=1.5, label="subgoals before")
         plot.subgoals(ax, adapted.law.subgoals)
         right.append(experiments.matched_right(k))
+    show_part(axes, (0.2, 5.3))
     plot.legend_below(figure, axes[0])
     return figure, {"matching_right": int(sum(right)), "layouts": len(right)}
 
 
+def show_part(axes, heights):
+    """The middle of the laboratory, between two heights y in m: what lies beyond is blank in every layout."""
+    for ax in axes:
+        ax.set(xlim=(0.6, 8.6), ylim=heights)
+        ax.label_outer()
+
+
 def figure_10b():
-    """The robot performing the adapted task among the moved obstacles."""
-    grid = experiments.background_map()
-    figure, axes = plt.subplots(1, len(experiments.LAYOUTS), figsize=(13, 4.5), sharey=True)
-    everything = []
-    for k, ax in enumerate(axes):
-        adapted, runs = experiments.adapted_task(k), experiments.moved_runs(k)
-        plot.workspace(grid, None, adapted.environment.boxes, ax)
-        plot.path(ax, adapted.law.response(), "control law", plot.LAW, linewidth=2)
-        plot.runs(ax, runs)
-        everything += runs
-    plot.legend_below(figure, axes[0])
-    return figure, {
-        "matching_right": int(sum(experiments.matched_right(k) for k in range(len(axes)))),
-        **experiments.counts(everything),
-        "min_clearance_m": min(run.clearance.min() for run in everything),
-    }
+    """The robot performing the adapted task among moved obstacles: the paper's kind of control, and Dollop's own."""
+    layouts = range(len(experiments.LAYOUTS))
+    figure, rows = plt.subplots(2, len(layouts), figsize=(WIDE, 4.9), sharex=True, sharey=True)
+    cases = [(k, choices) for _, choices in CONTROLS.values() for k in layouts]
+    runs_of = dict(zip(cases, at_once(experiments.moved_runs, [(k, *choices) for k, choices in cases]), strict=True))
+    metrics = {}
+    for axes, (suffix, (title, choices)) in zip(rows, CONTROLS.items(), strict=True):
+        everything = [runs_of[k, choices] for k in layouts]
+        for k, ax in enumerate(axes):
+            draw_runs(ax, experiments.adapted_task(k), everything[k], f"layout {k + 1}")
+        axes[1].set_title(f"{title}\nlayout 2")
+        runs = sum(everything, [])
+        numbers = experiments.counts(runs) | {"min_clearance_m": least_clearance(runs)}
+        metrics = {f"{key}{suffix}": value for key, value in numbers.items()} | metrics
+    show_part(rows.flat, (1.3, 5.3))
+    plot.legend_below(figure, *rows.flat)
+    return figure, {"matching_right": int(sum(experiments.matched_right(k) for k in layouts))} | metrics
 
 
 def figure_x1():
-    """Beyond the paper: share of layouts with every corner matched right, against box noise and number of objects."""
+    """Beyond the paper: share of layouts with every corner matched right, by method, with boxes ever less exact.
+
+    Left from boxes drawn at random, right from boxes as the laser sees them.
+    """
     shares = matching_shares(noises=(0.0, 0.025, 0.05, 0.1, 0.15, 0.2), layouts=300, seed=experiments.SEED)
-    figure, ax = plt.subplots(figsize=(6, 4))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), width_ratios=(2, 1), sharey=True)
     for (method, objects), rows in shares.groupby(["method", "objects"]):
-        colour = plot.LAW if method == "robust" else plot.OBSTACLE
-        marker = {2: "o", 3: "s", 4: "^"}[objects]
-        ax.plot(rows.noise, rows.right, marker=marker, color=colour, label=f"{method}, {objects} objects")
-    ax.set(xlabel="box sizes off by up to [m]", ylabel="share of layouts all right", ylim=(0, 1.03))
-    ax.legend(ncols=2, loc="center right", bbox_to_anchor=(1.0, 0.68))
+        look = {"color": plot.METHODS[method], "marker": {2: "o", 3: "s", 4: "^"}[objects]}
+        left.plot(rows.noise, rows.right, label=f"{method}, {objects} objects", **look)
+    left.set(xlabel="box sizes off by up to [m]", ylabel="share of layouts all right", ylim=(0, 1.08))
+    left.set_title("random boxes")
+    left.legend(ncols=2, loc="center right", bbox_to_anchor=(1.0, 0.68))
+    seen = at_once(experiments.matchings_from_laser, [("cans",), ("cones",)])
+    by_laser = dict(zip(("2 cans", "4 cones"), seen, strict=True))
+    for k, method in enumerate(("literal", "robust")):
+        found = [share[method] for share in by_laser.values()]
+        bars = right.bar(np.arange(2) + 0.4 * k, found, 0.38, color=plot.METHODS[method], label=method)
+        right.bar_label(bars, fmt="%.2f")
+    right.set_xticks(np.arange(2) + 0.2, by_laser)
+    right.set_title("boxes as the laser sees them")
     known = shares[shares.noise == 0.05]
-    by_laser = {kind: experiments.matchings_from_laser(kind) for kind in ("cans", "cones")}
-    return figure, {f"{row.method}_{row.objects}": row.right for row in known.itertuples()} | {
-        f"{method}_{kind}_seen": share for kind, found in by_laser.items() for method, share in found.items()
+    return figure, {f"{row.objects}_objects_{row.method}": row.right for row in known.itertuples()} | {
+        f"{kind.split()[1]}_seen_{method}": share for kind, found in by_laser.items() for method, share in found.items()
     }

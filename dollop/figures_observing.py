@@ -7,7 +7,9 @@ from matplotlib.patches import ConnectionPatch, Rectangle
 import dollop
 from dollop import experiments, plot
 from dollop.foreground import ForegroundGrid, endpoints, foreground_mask
-from dollop.observation import foreground_hits, static_boxes
+from dollop.observation import STATIC_EVERY, foreground_hits, static_boxes
+
+GAIN, STATIC_GAIN = 0.6, 0.1  # defaults of `dollop.observe`
 
 
 def figure_1():
@@ -108,88 +110,81 @@ def figure_4():
     recording, grid = experiments.figure_eights(), experiments.background_map()
     log, observation = recording.log, experiments.figure_eights_observed()
     i = scan_beside_the_cans(log)
-    figure, axes = plt.subplots(2, 4, figsize=(13, 6.2), sharex=True, sharey=True)
-    figure.get_layout_engine().set(w_pad=0.15, h_pad=0.15)
-    stages = axes[0].tolist() + axes[1, ::-1].tolist()
-    draw_sensing(stages[:3], log, grid, i)
-    draw_objects(stages[3:5], log, grid, i)
-    draw_tracks(stages[5:7], observation, log.t[i])
-    draw_environment(stages[7], observation)
-    for ax, title in zip(stages, STAGES, strict=True):
-        plot.grid_map(ax, grid, colour="#D0D0D0")
+    figure, axes = plt.subplots(2, 4, figsize=(10, 5.2), sharex=True, sharey=True)
+    figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
+    stages = dict(zip(STAGES, axes.flat, strict=True))
+    for title, ax in stages.items():
+        plot.grid_map(ax, grid, colour="black" if title == "background map" else "#D0D0D0")
         plot.plane(ax, title)
-        ax.set(xlim=(-0.1, 9.1), ylim=(-0.1, 7.1), xlabel="", ylabel="", xticks=(0, 3, 6, 9), yticks=(0, 3, 6))
-    figure.supxlabel("x [m]", fontsize=9)
-    figure.supylabel("y [m]", fontsize=9)
+        ax.set(xlim=(-0.1, 9.1), ylim=(-0.1, 7.1), xticks=(0, 3, 6, 9), yticks=(0, 3, 6))
+        ax.label_outer()
+    plot.scan(stages["laser scan"], log, i, label=None)
+    points = endpoints(log)[i]
+    cells = foreground_mask(points, grid)
+    stages["foreground cells"].plot(*points[~cells].T, ".", color=plot.BACKGROUND, markersize=2)
+    stages["foreground cells"].plot(*points[cells].T, ".", color=plot.USER, markersize=4)
+    foreground = draw_memory(stages["foreground grid"], log, grid, range(i + 1), GAIN)
+    draw_objects(stages["foreground objects"], foreground)
+    draw_memory(stages["slower foreground grid"], log, grid, range(0, len(log.t), STATIC_EVERY), STATIC_GAIN)
+    draw_tracks(stages["tracks, and the user"], observation, log.t[i])
+    plot.boxes(stages["static objects"], observation.environment.boxes)
     figure.canvas.draw()  # so that the axes are where the arrows ask for them
     for before, after in FLOW:
         connect(figure, stages[before], stages[after])
     return figure, {}
 
 
-STAGES = (
-    "laser scan",
-    "background map",
-    "foreground cells",
-    "foreground grid",
-    "foreground objects",
-    "Kalman filters, matched tracks",
-    "the user: the fastest object",
-    "static objects",
+STAGES = (  # two rows
+    *("laser scan", "foreground cells", "foreground grid", "foreground objects"),
+    *("background map", "slower foreground grid", "static objects", "tracks, and the user"),
 )
-FLOW = ((0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 6), (6, 7))
+FLOW = (
+    ("laser scan", "foreground cells"),
+    ("background map", "foreground cells"),
+    ("foreground cells", "foreground grid"),
+    ("foreground grid", "foreground objects"),
+    ("foreground objects", "tracks, and the user"),
+    ("foreground cells", "slower foreground grid"),
+    ("slower foreground grid", "static objects"),
+)
 
 
 def connect(figure, before, after):
-    """An arrow from one stage to the next."""
-    start, end = before.get_position().x0, after.get_position().x0
-    if start == end:
-        places = (0.5, -0.02), (0.5, 1.13)
+    """An arrow from one stage to another, which stands to its right, below it, or to its upper right."""
+    start, end = (ax.get_subplotspec() for ax in (before, after))
+    if start.colspan == end.colspan:
+        places = (0.5, -0.02), (0.5, 1.17)
     else:
-        places = ((1.02, 0.5), (-0.02, 0.5)) if start < end else ((-0.02, 0.5), (1.02, 0.5))
-    arrow = ConnectionPatch(
-        *places, before.transAxes, after.transAxes, arrowstyle="-|>", mutation_scale=20, linewidth=2, color="black"
-    )
-    figure.add_artist(arrow)
+        places = ((1.02, 0.5), (-0.02, 0.5)) if start.rowspan == end.rowspan else ((0.93, 1.02), (0.02, -0.02))
+    look = {"arrowstyle": "-|>", "mutation_scale": 18, "linewidth": 1.8, "color": "black"}
+    figure.add_artist(ConnectionPatch(*places, before.transAxes, after.transAxes, **look))
 
 
-def draw_sensing(axes, log, grid, i):
-    """Stages: the scan, the background map, the readings that the map does not explain."""
-    plot.scan(axes[0], log, i, label=None)
-    plot.grid_map(axes[1], grid, colour="black")
-    points = endpoints(log)[i]
-    cells = foreground_mask(points, grid)
-    axes[2].plot(*points[~cells].T, ".", color=plot.BACKGROUND, markersize=2)
-    axes[2].plot(*points[cells].T, ".", color=plot.USER, markersize=4)
+def draw_memory(ax, log, grid, scans, gain):
+    """A foreground grid that has taken in some scans: the darker a cell, the surer it is. Returns the grid."""
+    foreground, hits = ForegroundGrid(grid, gain), foreground_hits(log, grid)
+    for k in scans:
+        foreground.update(hits[k], log.poses[k], log.angles, log.ranges[k])
+    known = np.flatnonzero(foreground.value)
+    look = {"cmap": "Blues", "vmin": -0.2, "vmax": 1, "s": 3, "marker": "s"}
+    ax.scatter(*foreground.centres(known).T, c=foreground.value[known], **look)
+    return foreground
 
 
-def draw_objects(axes, log, grid, i):
-    """Stages: the foreground grid, and its blobs with their centroids."""
-    foreground = ForegroundGrid(grid, 0.6)
-    for k, hits in enumerate(foreground_hits(log, grid)[: i + 1]):
-        foreground.update(hits, log.poses[k], log.angles, log.ranges[k])
+def draw_objects(ax, foreground):
+    """Blobs, a colour each, and the centroids of the foreground objects."""
     blobs = foreground.blobs()
-    extent = grid.extent
-    axes[0].imshow(
-        np.ma.masked_equal(foreground.value.reshape(foreground.shape), 0), origin="lower", extent=extent, cmap="Blues"
-    )
-    axes[1].scatter(
-        *foreground.centres(blobs.cells @ [foreground.shape[1], 1]).T, c=blobs.labels, cmap="Dark2", s=2, marker="s"
-    )
-    axes[1].plot(*foreground.objects().T, "k+", markersize=9)
+    places = foreground.centres(blobs.cells @ [foreground.shape[1], 1])
+    ax.scatter(*places.T, c=blobs.labels, cmap="Dark2", s=3, marker="s")
+    ax.plot(*foreground.objects().T, "k+", markersize=9)
 
 
-def draw_tracks(axes, observation, now):
-    """Stages: every track so far, and the user's."""
+def draw_tracks(ax, observation, now):
+    """Every track up to a time in s, the user's over them."""
     for track in observation.tracks:
-        plot.path(axes[0], track.positions[track.t <= now], colour="0.3", marker=".", markersize=2)
+        plot.path(ax, track.positions[track.t <= now], colour="0.3", linewidth=2)
     user = observation.user
-    plot.path(axes[1], user.positions[user.t <= now], colour=plot.USER)
-
-
-def draw_environment(ax, observation):
-    """Stage: the static objects' boxes."""
-    plot.boxes(ax, observation.environment.boxes)
+    plot.path(ax, user.positions[user.t <= now], linewidth=2)
 
 
 def figure_5():

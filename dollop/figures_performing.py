@@ -1,5 +1,6 @@
 """Figures 6b and 7: the control law, and the robot that performs it (Sec. III)."""
 
+import joblib
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -8,6 +9,11 @@ from dollop.execution import distances_to_law, return_times
 from dollop.trajectory import distance_to_polyline, mean_trajectory
 
 SIZE = (6, 5.2)
+PAIR = (10, 4.7)
+CONTROLS = {  # suffix in the metrics: what it is, and how the robot is asked for it
+    "_plain": ("the paper's kind of control: plain, obstacles ignored", ("plain", False)),
+    "": ("Dollop's own: pursuit, going round obstacles", ("pursuit", True)),
+}
 
 
 def figure_6b():
@@ -18,7 +24,7 @@ def figure_6b():
     plot.workspace(experiments.background_map(), recording.log.poses[0], observation.environment.boxes, ax)
     for k, lap in enumerate(laps):
         plot.path(ax, lap, "laps" if k == 0 else None, linewidth=0.4, alpha=0.6)
-    plot.path(ax, law.response(), "control law", plot.LAW, linewidth=2)
+    plot.law(ax, law.response())
     plot.subgoals(ax, law.subgoals)
     plot.legend_below(figure, ax)
     return figure, {
@@ -30,20 +36,21 @@ def figure_6b():
 
 
 def figure_7a():
-    """Ten runs of the robot: the paper's law, and beside it the one that respects the robot's dynamics."""
+    """Ten runs of the robot: the paper's kind of law, and beside it the one that respects the robot's dynamics."""
     task = experiments.figure_eight_task()
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.9), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
     metrics = {}
-    for ax, control in zip(axes, ("plain", "pursuit"), strict=True):
-        runs = experiments.eight_runs(control)
-        draw_runs(ax, task, runs, f"{control} law")
+    titles = {"plain": "plain: points along the response", "pursuit": "pursuit: respects the robot's dynamics"}
+    runs_of = at_once(experiments.eight_runs, [(control,) for control in titles])
+    for ax, (control, title), runs in zip(axes, titles.items(), runs_of, strict=True):
+        draw_runs(ax, task, runs, title)
         distances = np.concatenate([distances_to_law(run, task.law) for run in runs])
         errors = [pose_errors(run) for run in runs]
         metrics[control] = {
             **experiments.counts(runs),
             "mean_distance_m": distances.mean(),
             "max_distance_m": distances.max(),
-            "min_clearance_m": min(run.clearance.min() for run in runs),
+            "min_clearance_m": least_clearance(runs),
             "localisation_error_m": np.mean([place for place, _ in errors]),
             "localisation_error_deg": np.degrees(np.mean([turn for _, turn in errors])),
         }
@@ -52,25 +59,39 @@ def figure_7a():
 
 
 def figure_7b():
-    """Five runs, each kidnapped once: the paper's law, and beside it the one that goes round obstacles."""
+    """Five runs, each kidnapped once: the paper's kind of law, and beside it the same law going round obstacles."""
     task = experiments.figure_eight_task()
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.9), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
     metrics = {}
-    for ax, name, choices in zip(axes, ("plain", "aware"), (("plain", False), ("pursuit", True)), strict=True):
-        runs = experiments.kidnapped_runs(*choices)
-        draw_runs(ax, task, runs, {"plain": "plain law", "aware": "pursuit, going round obstacles"}[name])
+    titles = {"plain": "plain, obstacles ignored", "aware": "plain, going round obstacles"}
+    runs_of = at_once(experiments.kidnapped_runs, [("plain", False), ("plain", True)])
+    for ax, (name, title), runs in zip(axes, titles.items(), runs_of, strict=True):
+        draw_runs(ax, task, runs, title)
         times = np.concatenate([return_times(run, task.law) for run in runs])
         back = times[np.isfinite(times)]
-        metrics[name] = experiments.counts(runs) | {"return_time_s": back.mean() if len(back) else None}
-    plot.legend_below(figure, axes[0])
+        metrics[name] = experiments.counts(runs) | {
+            "return_time_s": back.mean() if len(back) else None,
+            "min_clearance_m": least_clearance(runs),
+        }
+    plot.legend_below(figure, *axes)
     return figure, metrics["plain"] | {f"{key}_aware": value for key, value in metrics["aware"].items()}
+
+
+def at_once(work, arguments):
+    """What `work` returns for each of some arguments, two at a time: the numbers are the same, seeds being fixed."""
+    return joblib.Parallel(n_jobs=2)(joblib.delayed(work)(*each) for each in arguments)
 
 
 def draw_runs(ax, task, runs, title):
     """The law, and the runs of the robot over it."""
     plot.workspace(experiments.background_map(), None, task.environment.boxes, ax, title)
-    plot.path(ax, task.law.response(), "control law", plot.LAW, linewidth=2)
+    plot.law(ax, task.law.response())
     plot.runs(ax, runs)
+
+
+def least_clearance(runs):
+    """The least distance in m that any of the runs left between the robot's rim and an obstacle."""
+    return min(run.clearance.min() for run in runs)
 
 
 def pose_errors(run):

@@ -1,7 +1,8 @@
 """The drawing vocabulary: one colour per meaning, the plane in metres, used by figures and notebooks alike.
 
-Colours are from Okabe and Ito's palette, which colour-blind readers can tell apart; red boxes, green law and yellow
-robot are also the paper's.
+What is in the room has colours of Okabe and Ito's palette, what is compared in graphs has those of Tol's: colour-blind
+readers can tell them apart. Red boxes, green law and yellow robot are also the paper's. Black is for what is neutral:
+subgoals, corners, readings, writing.
 """
 
 import io
@@ -21,11 +22,33 @@ SUBGOAL = "#000000"
 MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper
 RUN = "#CC79A7"  # purple: where the robot went
 OCCLUDED = "#E69F00"  # orange: predictions while the user is occluded
-BACKGROUND = "#8C8C8C"
-TRUTH = "#56B4E9"
+BACKGROUND = "#8C8C8C"  # grey: the background map, and how things were before
+TRUTH = "#56B4E9"  # light blue: where the user or an object really was
+RAY = "#C3CED6"  # pale grey: the laser's rays
+SPRING = "#8296A8"  # slate: springs between corners
+FORCE = "#EE3377"  # magenta: the forces that they exert
+
+METHODS = {
+    "literal": "#999933",  # olive: the paper's matching
+    "robust": "#332288",  # indigo: what Dollop does by default, here ...
+    "merging": "#332288",  # ... and here
+    "plain mean": "#5F6B73",
+    "HMM, BIC": "#661100",  # browns: the two hidden Markov models
+    "left-to-right HMM, BIC": "#BF8B5E",
+}
+"""Colours of the methods that are compared, by their names in `dollop.match` and `dollop.baseline`."""
+
+RUN_SHADES = ("#CC79A7", "#7A3B62", "#E3A9C8", "#A6437C", "#4F2340")
+RUN_LINES = ("-", (0, (7, 1.5)), (0, (5, 1.2, 1, 1.2)), (0, (3, 1)), (0, (9, 1.5, 1, 1.5, 1, 1.5)))
+"""Shades of RUN and dashes by which a few runs are told apart."""
+
+HEADS_AT = 0.18, 0.65
+"""Where along a law its arrowheads are, as shares of its length: away from the crossing of a figure-eight."""
 
 HALO = withStroke(linewidth=2.5, foreground="white")
 """Keeps writing legible where it lies over lines."""
+
+RIM = 0.25  # m, radius of the robot drawn as a circle
 
 STYLE = {
     "figure.dpi": 100,
@@ -70,10 +93,11 @@ def boxes(ax, boxes, label=None, colour=OBSTACLE, **kwargs):
         ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, label=label if k == 0 else None, **kwargs))
 
 
-def robot(ax, pose, radius=0.25, label=None):
+def robot(ax, pose, radius=RIM, label=None):
     """The robot at pose (x, y, theta): a yellow circle with its heading."""
     x, y, theta = pose
-    ax.add_patch(Circle((x, y), radius, facecolor=ROBOT, edgecolor="black", zorder=4, label=label))
+    ax.add_patch(Circle((x, y), radius, facecolor=ROBOT, edgecolor="black", zorder=4))
+    ax.plot([], [], "o", color=ROBOT, markeredgecolor="black", markersize=10, label=label)
     ax.plot([x, x + radius * np.cos(theta)], [y, y + radius * np.sin(theta)], color="black", zorder=5)
 
 
@@ -81,6 +105,18 @@ def path(ax, positions, label=None, colour=USER, **kwargs):
     """A path (N, 2) in m."""
     kwargs = {"linewidth": 1} | kwargs
     ax.plot(*np.asarray(positions).T[:2], color=colour, label=label, **kwargs)
+
+
+def law(ax, response, label="control law", **kwargs):
+    """The response (N, 2) of a control law, and on its way two arrowheads that say which way it is walked."""
+    response = np.asarray(response)
+    kwargs = {"linewidth": 2, "colour": LAW} | kwargs
+    path(ax, response, label, **kwargs)
+    walked = np.append(0, np.hypot(*np.diff(response, axis=0).T).cumsum())
+    for share in HEADS_AT:
+        k = np.searchsorted(walked, share * walked[-1]).clip(1, len(response) - 1)
+        head = {"arrowstyle": "-|>", "mutation_scale": 18, "color": kwargs["colour"], "linewidth": 0}
+        ax.annotate("", response[k], response[k - 1], arrowprops=head | {"shrinkA": 0, "shrinkB": 0}, zorder=5)
 
 
 def subgoals(ax, subgoals, label="subgoals"):
@@ -96,8 +132,8 @@ def scan(ax, log, i, label="laser scan"):
     ends = np.column_stack([x + reach * np.cos(theta + log.angles), y + reach * np.sin(theta + log.angles)])
     ax.plot(
         *np.stack([np.broadcast_to([x, y], ends.shape), ends], axis=1)[back].transpose(2, 1, 0),
-        color=TRUTH,
-        linewidth=0.3,
+        color=RAY,
+        linewidth=0.5,
     )
     ax.plot(*ends[back].T, ".", color="black", markersize=3, label=label)
 
@@ -139,14 +175,37 @@ def picture(image):
 
 
 def runs(ax, runs):
-    """Where the robot went: one line per Run; a kidnapping is a dotted leap."""
+    """Where the robot went: one line per Run.
+
+    Kidnapped runs have a look and a number each; the kidnapping is a dotted leap to a numbered dot. A circle is the rim
+    of the robot where a run first touched something.
+    """
+    apart = any(len(run.kidnapped) for run in runs)
     for k, run in enumerate(runs):
+        look = {"linewidth": 0.9, "alpha": 0.8, "colour": RUN}
+        if apart:
+            look = {"linewidth": 1.2, "colour": RUN_SHADES[k % 5], "linestyle": RUN_LINES[k % 5]}
         leaps = np.searchsorted(run.t, run.kidnapped - 0.5 * run.t[1])
         for n, part in enumerate(np.split(run.true_poses[:, :2], leaps)):
-            path(ax, part, "robot's runs" if k == n == 0 else None, RUN, linewidth=0.9, alpha=0.8)
+            path(ax, part, "robot's runs" if k == n == 0 else None, **look)
         for leap in leaps:
             path(ax, run.true_poses[leap - 1 : leap + 1], "kidnapped" if k == 0 else None, "black", linestyle=":")
-            ax.plot(*run.true_poses[leap, :2], "o", color="black", markersize=4)
+            place = run.true_poses[leap, :2]
+            ax.plot(*place, "o", color="black", markersize=4, zorder=6)
+            written = {"textcoords": "offset points", "ha": "center", "va": "center", "path_effects": [HALO]}
+            ax.annotate(str(k + 1), place, xytext=(0, 9), weight="bold", zorder=8, **written)
+    hit = [run for run in runs if run.collisions]
+    for run in hit:
+        ax.add_patch(Circle(first_contact(run), RIM, fill=False, edgecolor="black", linewidth=0.8, zorder=7))
+    if hit:
+        look = {"color": "black", "markersize": 10, "fillstyle": "none", "markeredgewidth": 0.8}
+        ax.plot([], [], "o", label="first contact, robot's rim", **look)
+
+
+def first_contact(run):
+    """Where (2,) a Run that touched something was when its rim, taken as a circle, first met an obstacle."""
+    met = np.flatnonzero(run.clearance < 0)
+    return run.true_poses[met[0] if len(met) else run.clearance.argmin(), :2]
 
 
 def png(figure):
@@ -158,26 +217,35 @@ def png(figure):
 
 
 def cdhmm(ax, model, sd=2.0):
-    """A SubgoalHMM in the plane: states, steps between them, and the most-likely path in red.
+    """A SubgoalHMM in the plane: its states, the steps between them, and the most-likely path in red.
 
     Parameters
     ----------
     ax : matplotlib.axes.Axes
     model : SubgoalHMM
-        Its states as dots at their means, with their numbers and covariances; the start and the end are not drawn.
+        Its states as dots at their means, with their numbers and covariances; its start and its end, which have no
+        place, as words beside the states that the most-likely path begins and ends in.
     sd : float
         How many standard deviations each state's ellipse reaches.
     """
-    path_steps = set(pairwise(model.most_likely_path().tolist()))
-    ax.plot([], [], color=BACKGROUND, label="steps")
+    way = model.most_likely_path().tolist()
+    path_steps = set(pairwise(way))
+    steps = np.argwhere(model.transitions > 0).tolist()
+    if any((u, v) not in path_steps for u, v in steps):
+        ax.plot([], [], color=BACKGROUND, label="other steps")
     ax.plot([], [], color=MOST_LIKELY, label="most-likely path")
-    for u, v in np.argwhere(model.transitions > 0).tolist():
+    for u, v in steps:
         colour = MOST_LIKELY if (u, v) in path_steps else BACKGROUND
         step(ax, model.means[u], model.means[v], 0.5 + 2.0 * model.transitions[u, v], colour)
     for state, (mean, covariance) in enumerate(zip(model.means, model.covariances, strict=True)):
         label = f"states, {sd:g} sd" if state == 0 else None
         ellipse(ax, mean, covariance, sd, label=label)
-        ax.annotate(str(state), mean, xytext=(6, 6), textcoords="offset points", zorder=8, path_effects=[HALO])
+        written = {"textcoords": "offset points", "zorder": 8, "path_effects": [HALO]}
+        ax.annotate(str(state), mean, xytext=(6, 6), **written)
+        if state == way[0]:
+            ax.annotate("start", mean, xytext=(-8, 0), ha="right", va="center", style="italic", **written)
+        if state == way[-1]:
+            ax.annotate("end", mean, xytext=(14, -6), va="center", style="italic", **written)
     ax.plot(*model.means.T, ".", color=SUBGOAL, markersize=6, zorder=7)
 
 
@@ -196,6 +264,10 @@ def ellipse(ax, mean, covariance, sd=2.0, colour=SUBGOAL, label=None):
     ax.add_patch(Ellipse(mean, width, height, angle=angle, label=label, **look))
 
 
-def legend_below(figure, ax):
-    """The legend of one of several axes, in one row under the whole figure."""
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=6, columnspacing=1.0)
+def legend_below(figure, *axes, columns=6):
+    """One legend for what is drawn in the axes named, under the whole figure."""
+    shown = {}
+    for ax in axes:
+        handles, labels = ax.get_legend_handles_labels()
+        shown = dict(zip(labels, handles, strict=True)) | shown
+    figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=columns, columnspacing=1.0)

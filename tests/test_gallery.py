@@ -40,31 +40,56 @@ def test_panels_without_numbers_are_left_out():
     """Made alone, one figure gives a gallery of one."""
     page = gallery.page({"6b": {"mean_error_m": 0.013}}, figures.name_of)
     assert page.count("## Figure") == 1
-    assert "| mean error | 13 mm |" in page
+    assert "| mean error of the law | 13 mm |" in page
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "expected"),
+    ("value", "unit", "expected"),
     [
-        ("mean_distance_m_pursuit", 0.010436, "10 mm"),
-        ("min_clearance_m", -0.02, "-20 mm"),
-        ("localisation_error_deg", 0.1469, "0.1 °"),
-        ("cost_literal", 28268.0, "28268"),
-        ("share", 0.0, "0"),
-        ("exponent_merging", -0.50875, "-0.509"),
-        ("finished", 10, "10"),
-        ("indices", [4, 5], "4 5"),
-        ("return_time_s", None, "none"),
+        (0.010436, "m", "10 mm"),
+        (-0.02, "m", "-20 mm"),
+        (0.1469, "°", "0.1 °"),
+        (28268.0, "", "28268"),
+        (0.0, "", "0"),
+        (-0.50875, "", "-0.509"),
+        (10, "", "10"),
+        ([4, 5], "", "4 5"),
+        (None, "s", "none"),
     ],
 )
-def test_a_number_is_written_with_the_unit_of_its_key(key, value, expected):
+def test_a_number_is_written_with_its_unit(value, unit, expected):
     """Metres below one become millimetres, the rest keeps its unit; counts stay whole; what never happened is none."""
-    assert gallery.quantity(key, value) == expected
+    assert gallery.quantity(value, unit) == expected
+
+
+def test_every_number_has_words_and_the_unit_that_its_name_ends_in():
+    """A key of metrics.json without words cannot be added, nor one whose unit is not what it says."""
+    units = {"m": "m", "s": "s", "deg": "°"}
+    for panel, numbers in METRICS.items():
+        for key in numbers:
+            name, _ = gallery.parted(key, gallery.PANELS[panel].columns)
+            said = [units[word] for word in name.split("_")[1:] if word in units]
+            assert said == [unit for unit in [gallery.NAMES[name][1]] if unit], key
+
+
+def test_no_words_are_for_nothing():
+    """Every name is that of a number, every column has numbers, and no two names read alike."""
+    parts = [gallery.parted(key, gallery.PANELS[p].columns) for p, numbers in METRICS.items() for key in numbers]
+    assert {name for name, _ in parts} == set(gallery.NAMES)
+    for panel, words in gallery.PANELS.items():
+        assert set(words.columns) <= {gallery.parted(key, words.columns)[1] for key in METRICS[panel]}, panel
+    assert len({words for words, _ in gallery.NAMES.values()}) == len(gallery.NAMES)
+
+
+def test_a_number_without_words_is_refused():
+    """The page is not made with a bare key in it."""
+    with pytest.raises(KeyError, match="no words for the number 'bumps'"):
+        gallery.page({"7a": {"bumps": 3}}, figures.name_of)
 
 
 def test_main_writes_the_gallery_beside_the_pictures(tmp_path, monkeypatch):
     """The figure script leaves a page with the figures it made, in the order of the paper."""
-    monkeypatch.setattr(figures, "make", lambda panel, folder: {"runs": len(panel)})
+    monkeypatch.setattr(figures, "make", lambda panel, folder: {})
     figures.main(["x1", "7a", "--folder", str(tmp_path)])
     page = (tmp_path / "README.md").read_text()
     assert page.index("## Figure 7a") < page.index("## Figure x1")
