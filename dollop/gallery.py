@@ -143,8 +143,8 @@ PANELS = {
         "The result after mapping the subgoals to a new environment.",
         "Nobody ever walked among these cones; the fan is the starts of ten runs, the same above and below. Above "
         "the paper's kind of control: the plain law, which knows of no obstacle. It touches a cone, backs off and "
-        "gets round it. A laser sees the near side of a body, so the track, and the law with it, is too near to what "
-        "the user passed behind, and a robot is wider than a line. Below Dollop's own: it goes round what is in the "
+        "gets round it: past the third cone the law leaves less room than the robot needs, for a law is a line, and "
+        "moved subgoals do not keep every distance. Below Dollop's own: it goes round what is in the "
         "way, and that alone is why nothing is touched. The circles are the robot where it first touches something.",
         plain="plain, obstacles ignored",
         own="pursuit, going round obstacles",

@@ -31,6 +31,15 @@ def test_weights_fall_with_distance_and_sum_to_one():
     np.testing.assert_allclose(np.linalg.norm(association.differences, axis=2), np.sort(distances, axis=1)[:, :6])
 
 
+def test_weights_are_the_formula():
+    """w_l ~ 1 / (d_l^2 + eps) with eps the square of a 5 cm cell, over the m nearest corners, loop by loop."""
+    association = associate(np.vstack([SUBGOALS, BOXES[0, :2]]), Environment(BOXES), m=5)
+    for place, weights in zip([*SUBGOALS, BOXES[0, :2]], association.weights, strict=True):
+        squares = sorted(((place - corner) ** 2).sum() for corner in Environment(BOXES).corners)[:5]
+        shares = [1 / (square + 0.0025) for square in squares]
+        np.testing.assert_allclose(weights, np.array(shares) / sum(shares))
+
+
 def test_relocation_is_the_formula():
     """s' is the weighted mean over the matched corners of their new places plus the old differences, loop by loop."""
     association = associate(SUBGOALS, Environment(BOXES), m=5)
@@ -122,6 +131,18 @@ def test_weights_do_not_hang_on_rounding():
     np.testing.assert_allclose(associate_with_frames([goals + shift for shift in shifts], alike).weights, alone)
 
 
+def test_ties_carried_to_fewer_objects_hold_on_to_those():
+    """An object is gone and the others move on twice: as relocating at once, by the remaining corners alone."""
+    association = associate(SUBGOALS, Environment(BOXES), m=12)
+    fewer, later = Environment(BOXES[[2, 0]] + 0.3), Environment(BOXES[[2, 0]] + [[1.0], [-0.5]])
+    matching = _matching([4, 5, 6, 7, -1, -1, -1, -1, 0, 1, 2, 3])
+    carried = association.carried(fewer, matching)
+    np.testing.assert_allclose(carried.relocate(later), association.relocate(later, matching))
+    np.testing.assert_allclose(carried.relocate(fewer), association.relocate(fewer, matching))
+    with pytest.raises(ValueError, match="to the 8 present ones, got 12 indices up to 8"):
+        association.relocate(fewer, _matching([8, *[-1] * 11]))
+
+
 def test_bad_associations_are_refused():
     """No object, m out of range, NaN, another number of objects, a foreign matching, no corner left: errors by name."""
     environment = Environment(BOXES)
@@ -182,7 +203,7 @@ def test_one_demonstration_is_weighted_by_closeness_as_with_corners():
 def test_demonstrations_in_one_environment_leave_closeness_alone():
     """Several demonstrations among objects that stand still do not tell which object matters: weights by closeness."""
     rng = np.random.default_rng(0)
-    frames = Frames.of(Environment(BOXES))
+    frames = Frames(Environment(BOXES).centres, np.zeros(len(BOXES)))
     several = associate_with_frames(SUBGOALS + rng.normal(0, 0.05, (5, 4, 2)), [frames] * 5)
     one = associate_with_frames(SUBGOALS[None], [frames])
     np.testing.assert_allclose(several.weights, one.weights, rtol=0.2, atol=0.01)

@@ -31,10 +31,10 @@ def test_edge_is_distance_less_radius():
         assert BOX.edge(x, 0.0) == pytest.approx(x - 0.5 - 0.25, abs=0.01)
 
 
-def test_edges_agree_with_edge():
-    """Asking for many places at once answers as asking for each."""
-    points = np.random.default_rng(0).uniform(-3, 3, (50, 2))
-    assert BOX.edges(points) == pytest.approx([BOX.edge(x, y) for x, y in points])
+def test_edges_agree_with_edge_up_to_the_border_and_beyond():
+    """Asked for one place or many, inside the map and off it, the answer is the same."""
+    points = np.random.default_rng(1).uniform(-5, 5, (300, 2))
+    assert BOX.edges(points) == pytest.approx([BOX.edge(x, y) for x, y in points], abs=2e-4)
 
 
 def test_inside_is_negative():
@@ -74,6 +74,18 @@ def test_unchanged_when_leaving(place, angle):
 
 
 @given(places, angles)
+def test_modulation_is_the_formula(place, angle):
+    """Within the influence: (1 - 1/Gamma) along the normal, (1 + 1/Gamma) along the tangent, brought to unit length."""
+    edge, nx, ny = BOX.edge_and_slope(*place)
+    n, u = np.array([nx, ny]) / max(np.hypot(nx, ny), 1e-12), np.array(unit(angle))
+    if edge < INFLUENCE and n @ u < -1e-6 and np.hypot(nx, ny) > 0.1:
+        share = (INFLUENCE - edge) / (INFLUENCE - KEPT)
+        turned = (1 - share) * (n @ u) * n + (1 + share) * (u - (n @ u) * n)
+        if np.hypot(*turned) > 1e-6:
+            assert BOX.modulate(*place, *u) == pytest.approx(tuple(turned / np.hypot(*turned)), abs=1e-6)
+
+
+@given(places, angles)
 def test_never_towards_what_is_at_the_kept_distance(place, angle):
     """At the kept distance or nearer, the modulated direction, of unit length, does not point into the obstacle."""
     edge, nx, ny = BOX.edge_and_slope(*place)
@@ -98,14 +110,14 @@ def test_flow_keeps_clear_of_a_convex_obstacle(bearing, offset):
 
 
 @given(places, angles, st.floats(0.3, 3.0))
-def test_speed_limit_leaves_room_to_brake(place, theta, deceleration):
-    """One period at the limit and then braking takes no more than the room there is; in contact, only outwards."""
+def test_speed_limit_uses_the_room_there_is(place, theta, deceleration):
+    """One period at the limit and then braking takes all the room; with none, it creeps outwards or stands."""
     limit = BOX.speed_limit(*place, theta, deceleration, 0.1)
     edge, nx, ny = BOX.edge_and_slope(*place)
     if edge > 0.02:
-        assert limit * 0.1 + limit**2 / (2 * deceleration) <= edge + 1e-9
+        assert limit * 0.1 + limit**2 / (2 * deceleration) == pytest.approx(edge)
     else:
-        assert limit == 0.0 or nx * np.cos(theta) + ny * np.sin(theta) > 0
+        assert limit == (0.05 if nx * np.cos(theta) + ny * np.sin(theta) > 0.2 else 0.0)
 
 
 def test_geodesic_is_the_distance_in_the_open():
@@ -138,6 +150,20 @@ def test_geodesic_leads_out_of_a_trap():
         x, y = x + 0.03 * ux, y + 0.03 * uy
         assert obstacles.edge(x, y) > 0
     assert np.hypot(x - 7.0, y - 3.0) < 0.1
+
+
+def test_the_way_keeps_off_what_may_be_occupied():
+    """Cells from an occupancy of 0.2 on and the map's border are obstacles, on a map that begins anywhere."""
+    occupancy = np.zeros((60, 120))
+    occupancy[28:32, 20:100] = 0.25
+    obstacles = ObstacleMap.of(Environment(np.empty((0, 4))), OccupancyGrid(occupancy, (1.0, -2.0), 0.05))
+    way, (x, y), nearest = Geodesic(obstacles, (6.5, 0.5)), (1.5, -1.5), np.inf
+    for _ in range(400):
+        ux, uy = way.direction(x, y)
+        x, y = x + 0.02 * ux, y + 0.02 * uy
+        nearest = min(nearest, obstacles.edge(x, y))
+    assert np.hypot(x - 6.5, y - 0.5) < 0.1 and nearest > 0.06
+    assert obstacles.edge(4.0, -0.5) < -0.25 and obstacles.edge(1.3, -1.5) == pytest.approx(0.0, abs=0.01)
 
 
 def test_geodesic_to_a_walled_place():

@@ -6,9 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rooms import figure_eight_task
 
+from dollop.avoidance import ObstacleMap
 from dollop.control import CONTROL_LAWS, PIONEER_LIMITS, REACH, STEP, Guidance, Limits, bend_speeds, clip, wrap
+from dollop.environment import Environment
 from dollop.execution import Unicycle
-from dollop.lds import LDS
+from dollop.gridmap import OccupancyGrid
+from dollop.lds import LDS, Statistics
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import distance_to_polyline
 
@@ -26,6 +29,20 @@ def random_law(seed):
     walks = [rng.normal(0, 0.4, (rng.integers(4, 30), 2)).cumsum(axis=0) for _ in range(rng.integers(2, 5))]
     segments = [LDS.fit(walk - walk[-1] + rng.uniform(-2, 2, 2), retimed=bool(rng.random() < 0.5)) for walk in walks]
     return SequencedLDS(tuple(segments), rng.uniform(-2, 2, 2), rng.uniform(0.1, 1.5, len(segments)))
+
+
+def straight_law(*goals, speed=0.3):
+    """One LDS per goal that heads straight for it from anywhere."""
+    still = Statistics(np.eye(2), 0.9 * np.eye(2))
+    segments = tuple(LDS(still, goal) for goal in goals)
+    return SequencedLDS(segments, np.zeros(2), np.full(len(goals), speed))
+
+
+def trap():
+    """Obstacles: a U that is open to the left, 8 m by 6 m around it."""
+    occupancy = np.zeros((120, 160))
+    occupancy[30:90, 100:104] = occupancy[30:34, 40:104] = occupancy[86:90, 40:104] = 1
+    return ObstacleMap.of(Environment([]), OccupancyGrid(occupancy, (0.0, 0.0), 0.05))
 
 
 def drive(law, control, pose, limit=4000):
@@ -148,3 +165,97 @@ def test_bend_speeds_can_be_braked_for(seed):
     speeds = bend_speeds(places, np.full(60, 0.5), PIONEER_LIMITS)
     assert (speeds <= 0.5 + 1e-12).all() and (speeds > 0).all()
     assert (speeds[:-1] ** 2 - speeds[1:] ** 2 <= 2 * PIONEER_LIMITS.acceleration * STEP + 1e-9).all()
+
+
+@pytest.mark.parametrize("error", [-2.0, -1.21, -1.19, -0.2, 0.0, 0.2, 1.0, 1.19, 1.21, 2.0])
+def test_commands_are_the_formulas(error):
+    """Plain: s cos e and 3 e; pursuit: the circle through the point 0.35 m ahead; both first turn where e is sharp."""
+    pose = (1.0, 2.0, np.arctan2(2, 4) - error)
+    commands = {
+        name: kind(Guidance(straight_law((5, 4))), [0.3], Unicycle(pose)).command(*pose)
+        for name, kind in CONTROL_LAWS.items()
+    }
+    turn = np.clip(3 * error, -0.8, 0.8)
+    if abs(error) > 1.2:
+        assert commands["plain"] == commands["pursuit"] == pytest.approx((0.0, turn))
+    else:
+        assert commands["plain"] == pytest.approx((0.3 * np.cos(error), turn))
+        curvature = 2 * np.sin(error) / 0.35
+        speed = min(0.3, 0.8 / max(abs(curvature), 1e-9))
+        assert commands["pursuit"] == pytest.approx((speed, curvature * speed))
+
+
+@pytest.mark.parametrize("control", sorted(CONTROL_LAWS))
+@pytest.mark.parametrize(("demonstrated", "driven"), [(0.01, 0.1), (0.3, 0.3), (2.0, 0.5)])
+def test_speeds_are_brought_into_the_robots_range(control, demonstrated, driven):
+    """Straight on, the robot drives as the user did, but neither below 0.1 m/s nor above its limit."""
+    pose = (0.0, 0.0, 0.0)
+    supervisor = CONTROL_LAWS[control](Guidance(straight_law((5, 0))), [demonstrated], Unicycle(pose))
+    assert supervisor.command(*pose) == pytest.approx((driven, 0.0))
+
+
+def test_near_an_obstacle_it_can_still_brake():
+    """The speed is the wanted one or what the obstacle map allows there, whichever is less; from far to contact."""
+    obstacles = ObstacleMap.of(Environment([[2.0, -3.0, 2.2, 3.0]]), places=[[5, 0]])
+    supervisor = CONTROL_LAWS["plain"](Guidance(straight_law((5, 0)), obstacles), [0.5], Unicycle((0.0, 0.0, 0.0)))
+    places = np.linspace(0, 2, 41)
+    limits = np.array([obstacles.speed_limit(x, 0.0, 0.0, 0.5, 0.1) for x in places])
+    assert [supervisor.safe(0.5, x, 0.0, 0.0) for x in places] == pytest.approx(np.minimum(limits, 0.5))
+    assert limits.max() > 0.6 and limits.min() == 0
+
+
+def test_the_way_leads_out_of_a_trap_and_to_every_subgoal():
+    """Where the response comes to a halt in a U, a detour takes its place; the way touches nothing, skips nothing."""
+    guidance = Guidance(straight_law((4, 3), (7, 3), (7, 5)), trap())
+    places, segments = guidance.way(0, 1.0, 3.0)
+    places, segments = np.array(places), np.array(segments)
+    assert guidance.obstacles.edges(places).min() > 0
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() < STEP + 1e-9
+    assert list(guidance.detours) == [1] and sorted(set(segments.tolist())) == [0, 1, 2]
+    for k, goal in enumerate(guidance.goals):
+        assert np.hypot(*(places[segments == k][-1] - goal)) < 0.1
+
+
+def test_the_way_ends_where_there_is_none():
+    """A subgoal behind a wall: the way holds the segments before it and nothing of it, not 100 m of wandering."""
+    wall = np.zeros((120, 160))
+    wall[:, 100:104] = 1
+    obstacles = ObstacleMap.of(Environment([]), OccupancyGrid(wall, (0.0, 0.0), 0.05))
+    places, segments = Guidance(straight_law((3, 3), (7, 3), (3, 1)), obstacles).way(0, 1.0, 3.0)
+    assert set(segments) == {0} and len(places) < 60
+    assert np.hypot(*np.subtract(places[-1], (3, 3))) < STEP + 1e-9
+
+
+@pytest.mark.parametrize("control", sorted(CONTROL_LAWS))
+def test_without_progress_it_slows_down_and_gives_up(control):
+    """Held fast, the pace is halved every eight seconds; below a sixteenth, after the fifth time, it is hopeless."""
+    pose = (0.0, 0.0, 0.0)
+    supervisor, paces = CONTROL_LAWS[control](Guidance(straight_law((5, 0))), [0.3], Unicycle(pose)), []
+    while not supervisor.hopeless and len(paces) < 1000:
+        supervisor.command(*pose)
+        paces.append(supervisor.pace)
+    halved = 0.1 * np.flatnonzero(np.diff(paces))
+    assert sorted(set(paces)) == [1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1]
+    np.testing.assert_allclose(np.diff(halved, prepend=0.0), 8.0, atol=0.25)
+
+
+def test_first_a_detour_and_only_then_slower():
+    """Among obstacles the first thing to change is the way, the second the pace; a new segment begins afresh."""
+    supervisor = CONTROL_LAWS["plain"](Guidance(straight_law((7, 3), (7, 5)), trap()), [0.3, 0.3], Unicycle((4, 3, 0)))
+    supervisor.insist()
+    assert supervisor.pace == 1.0 and list(supervisor.guidance.detours) == [0]
+    supervisor.insist()
+    assert supervisor.pace == 0.5
+    supervisor.hand_over(1)
+    assert (supervisor.active, supervisor.pace, supervisor.done) == (1, 1.0, False)
+
+
+@pytest.mark.parametrize(("jump", "pace"), [(0.28, 0.5), (0.32, 1.0)])
+def test_a_kidnapped_robot_begins_its_segment_afresh(jump, pace):
+    """Farther than any robot drives in a period it was carried: full pace and no detour again."""
+    supervisor = CONTROL_LAWS["plain"](Guidance(straight_law((7, 3)), trap()), [0.3], Unicycle((4, 3, 0)))
+    supervisor.command(4.0, 3.0, 0.0)
+    supervisor.insist()
+    supervisor.insist()
+    supervisor.command(4.0 - jump, 3.0, 0.0)
+    assert supervisor.pace == pace and (0 in supervisor.guidance.detours) == (pace < 1)

@@ -18,8 +18,8 @@ def test_corners_run_counter_clockwise_from_the_lower_left():
 
 
 def test_centres_are_the_means_of_the_corners():
-    """The centre of a box is the mean of its four corners."""
-    environment = Environment(BOXES)
+    """The centre of a box is the mean of its four corners, and so it is where the box is flat or a point."""
+    environment = Environment([*BOXES, [1, 2, 1, 3], [4, 4, 4, 4]])
     np.testing.assert_allclose(environment.centres, environment.corners.reshape(-1, 4, 2).mean(axis=1))
 
 

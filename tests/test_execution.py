@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from rooms import CANS, FURNITURE, figure_eight_task, room_map
+from rooms import CANS, figure_eight_task, room_map
 
 from dollop.avoidance import INFLUENCE, ObstacleMap
 from dollop.control import PIONEER_LIMITS, Limits
@@ -33,14 +33,28 @@ def kidnappings(task, background):
     return list(zip(np.random.default_rng(2).uniform(1, 33, 50), poses, strict=True))
 
 
-class Blind(Unicycle):
-    """Never knows where it is, and remembers its commands."""
+class Recorded(Unicycle):
+    """Remembers its commands; believes to be elsewhere, knows its pose or feels something at the periods it is told."""
 
-    localised, commands = False, ()
+    def __init__(self, pose, astray=(0.0, 0.0), lost=(), felt=None):
+        self.commands, self.astray, self.lost, self.felt = [], astray, lost, felt
+        super().__init__(pose)
 
     def drive(self, speed, turn):
-        self.commands = (*self.commands, (speed, turn))
+        self.commands.append((speed, turn))
         super().drive(speed, turn)
+
+    @property
+    def true_pose(self):
+        return self.pose[0] + self.astray[0], self.pose[1] + self.astray[1], self.pose[2]
+
+    @property
+    def localised(self):
+        return len(self.commands) not in self.lost
+
+    @property
+    def touching(self):
+        return None if self.felt is None else len(self.commands) in self.felt
 
 
 class Stuck(Unicycle):
@@ -187,14 +201,49 @@ def test_time_is_limited(task):
     assert run.t[-1] == pytest.approx(5.0)
 
 
-def test_a_robot_that_never_knows_where_it_is_only_turns(task):
-    """Until it is localised the robot turns on the spot, and gives up after the time it is given."""
-    robot = Blind(START)
+def test_until_it_knows_where_it_is_it_looks_round(task):
+    """It turns on the spot at half a radian a second; what counts is how long it has been lost at a stretch."""
+    lost = [*range(0, 80), *range(81, 160)]
+    robot = Recorded(START, lost=lost)
     run = perform(task, robot, localise_within=10.0)
-    assert not run.finished and "has not known where it is" in run.reason
-    assert all(speed == 0.0 for speed, _ in robot.commands)
+    assert run.finished and not run.localised[lost].any() and run.localised[80] and run.localised[160:].all()
+    assert {robot.commands[k] for k in lost} == {(0.0, 0.5)}
+    assert robot.commands[-1] == (0.0, 0.0) and len(robot.commands) == len(run.t)
+
+
+def test_a_robot_that_never_knows_where_it_is_gives_up(task):
+    """Having turned on the spot for the time it is given, it is told to stop, and has not moved from its place."""
+    robot = Recorded(START, lost=range(1000))
+    run = perform(task, robot, localise_within=10.0)
+    assert not run.finished and run.reason == "the robot has not known where it is for 10 s"
+    assert run.t[-1] == pytest.approx(10.0) and not run.localised.any()
+    assert set(robot.commands[:-1]) == {(0.0, 0.5)} and robot.commands[-1] == (0.0, 0.0)
     assert run.true_poses[:, :2] == pytest.approx(np.tile(START[:2], (len(run.t), 1)))
-    assert not run.localised.any()
+
+
+def test_what_happened_is_told_from_the_true_pose(task):
+    """A robot that is 0.4 m off where it believes to be: clearance and distance to the law are those of the truth."""
+    run = perform(task, Recorded(START, astray=(0.3, -0.4)), control="plain", avoid=False)
+    np.testing.assert_allclose(run.true_poses[:, :2] - run.poses[:, :2], np.tile([0.3, -0.4], (len(run.t), 1)))
+    away = np.maximum(CANS[:, :2] - run.true_poses[:, None, :2], run.true_poses[:, None, :2] - CANS[:, 2:])
+    np.testing.assert_allclose(run.clearance, np.hypot(*np.maximum(away, 0).T).min(axis=0) - 0.25, atol=0.06)
+    response = task.law.response(run.true_poses[0, :2])
+    np.testing.assert_allclose(distances_to_law(run, task.law), distance_to_polyline(run.true_poses[:, :2], response))
+
+
+def test_collisions_are_what_is_felt(task):
+    """A robot that can feel: touching from period 5 to 8 and again at 12 is two collisions, however near things are."""
+    assert perform(task, Recorded(START, felt=(5, 6, 7, 8, 12))).collisions == 2
+    assert perform(task, Recorded(START, felt=())).collisions == 0
+
+
+def test_it_is_kidnapped_when_and_where_it_is_told(task):
+    """The schedule is kept whatever its order: at 3 s and 6 s the robot is at those poses, and the run records when."""
+    kidnap = [(6.0, (2.0, 2.0, 1.0)), (3.0, (5.0, 5.5, -1.0))]
+    run = perform(task, Unicycle(START), kidnap=kidnap)
+    np.testing.assert_allclose(run.poses[[30, 60]], [kidnap[1][1], kidnap[0][1]])
+    assert run.kidnapped.tolist() == [3.0, 6.0]
+    assert (np.hypot(*np.diff(run.poses[:, :2], axis=0).T) > 0.06).sum() == 2
 
 
 def test_a_pose_that_is_lost_ends_the_run(task):
@@ -211,6 +260,19 @@ def test_return_times(task):
     assert return_times(runs[0], task.law) == pytest.approx([0.0], abs=1e-9)
     assert 0.5 < return_times(runs[1], task.law)[0] < 20
     assert runs[0].kidnapped == pytest.approx([8.0])
+
+
+def test_return_times_by_hand(task):
+    """Back after 1 s; kidnapped again before; back after 2 s, a touch of half a second not counting; ended before."""
+    response, t = task.law.response(), np.arange(110) / 10
+    across = (response[41] - response[39]) @ [[0, 1], [-1, 0]]
+    beside = response[40] + 0.15 * across / np.hypot(*across)
+    places = np.tile(response[40], (110, 1))
+    places[0] = task.law.start
+    places[(t >= 2) & (t < 3) | (t >= 4) & (t < 6) | (t >= 10) & (t < 10.5)] += [0.0, 5.0]
+    places[(t >= 6) & (t < 7) | (t >= 7.5) & (t < 8)] = beside
+    run = SimpleNamespace(true_poses=np.c_[places, 0 * t], t=t, kidnapped=np.array([2.0, 4.0, 6.0, 10.0]))
+    np.testing.assert_allclose(return_times(run, task.law), [1.0, np.inf, 2.0, np.inf])
 
 
 def test_crossing_the_response_is_not_coming_back(task):
@@ -279,6 +341,17 @@ def test_a_lost_robot_tries_the_other_way():
     assert [v for v, _ in freed[:10]] == [pressed[-1]] * 10 and freed[-1] == (0.0, 0.5)
 
 
+def test_free_poses_are_free_and_everywhere(task, background):
+    """Poses have the room asked for, in every corner of the map that can be reached, and head anywhere."""
+    obstacles = ObstacleMap.of(task.environment, background)
+    poses = free_poses(300, obstacles, task.law.subgoals[0], seed=0, room=0.3)
+    assert obstacles.edges(poses[:, :2]).min() > 0.3 - 1e-6
+    assert np.histogram(poses[:, 2], 4, (-np.pi, np.pi))[0].min() > 40
+    assert np.ptp(poses[:, 0]) > 6.5 and np.ptp(poses[:, 1]) > 4.5
+    divided = ObstacleMap.of(Environment([[5.4, 0.0, 5.6, 7.0]]), background)
+    assert free_poses(50, divided, (2.0, 2.0), seed=0)[:, 0].max() < 5.4
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -319,8 +392,8 @@ def test_subgoals_must_be_free(task, background, place, message):
 
 
 def test_inputs_are_not_changed(task, background):
-    """Performing leaves law, map and schedule as they were."""
+    """Performing leaves law, map, environment and schedule as they were."""
     subgoals, occupancy, kidnap = task.law.subgoals.copy(), background.occupancy.copy(), [(3.0, (2.0, 2.0, 0.0))]
     perform(task, Unicycle(START), background=background, kidnap=kidnap)
     assert (task.law.subgoals == subgoals).all() and (background.occupancy == occupancy).all()
-    assert kidnap == [(3.0, (2.0, 2.0, 0.0))] and PIONEER_LIMITS == (0.5, 0.8, 0.5, 1.57) and len(FURNITURE) == 4
+    assert (task.environment.boxes == CANS).all() and kidnap == [(3.0, (2.0, 2.0, 0.0))]

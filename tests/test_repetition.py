@@ -97,8 +97,8 @@ def test_laps_do_not_depend_on_where_the_lab_lies(angle, x, y):
 
 
 def test_a_clock_that_runs_backwards():
-    """Laps need increasing times, one for each position."""
-    track = eight(2, 50)
-    for t in (np.arange(50)[::-1], np.zeros(50), np.arange(49)):
+    """Laps need increasing times, one for each position; a single step back or a pause is enough to be refused."""
+    track, once = eight(2, 50), np.arange(50) == 20
+    for t in (np.arange(50)[::-1], np.zeros(50), np.arange(49), np.arange(50) - once, np.arange(50) - 1.3 * once):
         with pytest.raises(ValueError, match="t must increase"):
             laps(t, track)

@@ -247,4 +247,5 @@ def test_any_walks_can_be_fitted(walks, retimed):
     assert np.allclose(law.start, np.mean([walk[0] for walk in walks], axis=0))
     assert np.allclose(law.subgoals[-1], np.mean([walk[-1] for walk in walks], axis=0))
     assert np.linalg.norm(law.response()[-1] - law.subgoals[-1]) <= 0.01
-    assert (law.speeds >= 0).all() and arc_length(law.response())[-1] < np.inf
+    fastest = max(np.diff(arc_length(walk)).max() for walk in walks) / 0.1
+    assert (law.speeds >= 0).all() and (law.speeds <= fastest * (1 + 1e-9)).all()

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dollop import Demonstration, Environment, FormatError, Task, learn
-from dollop.task import anchors
+from dollop.task import anchors, members_along
 
 CANS = np.array([[2.3, 3.4, 2.7, 3.8], [6.3, 3.4, 6.7, 3.8]])
 THREE = np.vstack([CANS, [4.0, 1.0, 4.4, 1.4]])
@@ -78,6 +78,21 @@ def test_turned_laws_turn_with_the_layout():
         for kind in (True, False)
     ]
     assert error[0] < 0.25 and error[1] > 3 * error[0]
+
+
+def test_turned_subgoals_turn_the_response(task):
+    """Start and all subgoals turned about a place: so is the response, if every LDS is turned with them."""
+    R = np.array([[np.cos(2.5), -np.sin(2.5)], [np.sin(2.5), np.cos(2.5)]])
+    turned = task.law.with_subgoals(task.law.subgoals @ R.T, task.law.start @ R.T, turned=True)
+    np.testing.assert_allclose(turned.response(), task.law.response() @ R.T, atol=1e-9)
+
+
+def test_by_default_no_law_is_turned(task):
+    """Adapted as the paper does it, every LDS keeps its matrix, however the cans moved; turned ones do not."""
+    boxes = Environment(CANS + np.tile([[0.0, 0.5], [0.0, -0.5]], 2))
+    plain, turned = task.adapt(boxes), task.adapt(boxes, turned=True)
+    assert all((a.A == b.A).all() for a, b in zip(plain.law.segments, task.law.segments, strict=True))
+    assert max(np.abs(a.A - b.A).max() for a, b in zip(turned.law.segments, task.law.segments, strict=True)) > 0.01
 
 
 def test_a_can_that_is_gone_does_not_stop_the_task():
@@ -185,6 +200,49 @@ def test_several_demonstrations_share_their_subgoals():
     boxes = CANS + np.tile([[0.3, -0.3], [-0.2, 0.3]], 2)
     law = task.adapt(Environment(boxes)).law
     np.testing.assert_array_equal(windings(law.response(), boxes), windings(eight(), CANS))
+
+
+def test_a_demonstration_elsewhere_is_mapped_to_the_first_environment():
+    """The same walk round the same cans three metres away teaches the same, and merges with the first (Sec. V)."""
+    shift = np.array([3.0, 2.0])
+    here = Demonstration(eight(), Environment(CANS))
+    task = learn([here, Demonstration(eight(shift), Environment(CANS + [*shift] * 2))])
+    first, second = task.model.sequences
+    np.testing.assert_allclose(second, first, atol=1e-6)
+    assert task.model.outliers() == () and len(task.model.means) == len(first)
+    np.testing.assert_allclose(task.law.response(), here.law.response(), atol=1e-6)
+
+
+def test_learned_start_speeds_and_laws_are_means_over_the_demonstrations():
+    """In one environment: start and speeds are means, and each LDS is that of the added statistics of its edge."""
+    walks = [eight(noise=0.02, seed=1), eight((0.12, -0.06), noise=0.02, seed=2)]
+    walks[1] = walks[1][::2]  # twice as fast
+    demonstrations = [Demonstration(walk, Environment(CANS)) for walk in walks]
+    task, laws = learn(demonstrations), [shown.law for shown in demonstrations]
+    members = members_along(task.model)
+    assert max(len(shared) for shared in members) == 2
+    np.testing.assert_allclose(task.law.start, np.mean([walk[0] for walk in walks], axis=0), atol=1e-6)
+    for segment, speed, shared in zip(task.law.segments, task.law.speeds, members, strict=True):
+        assert speed == pytest.approx(np.mean([laws[d].speeds[i] for d, i in shared]))
+        G0, G1 = (sum(getattr(laws[d].segments[i].statistics, name) for d, i in shared) for name in ("G0", "G1"))
+        np.testing.assert_allclose(segment.statistics.G0, G0)
+        np.testing.assert_allclose(segment.statistics.G1, G1)
+    ends = [np.mean([laws[d].subgoals[i] for d, i in shared], axis=0) for shared in members]
+    np.testing.assert_allclose(task.law.subgoals, ends, atol=0.01)
+
+
+def test_a_demonstration_without_one_of_the_cans_still_teaches():
+    """Of three cans the second demonstration lacks one: the task learned from both still goes along with all three."""
+    shown = Task.of(Demonstration(eight(), Environment(THREE)))
+    boxes = THREE[:2] + np.tile([[0.3, 0.1], [-0.1, 0.2]], 2)
+    walk = shown.adapt(Environment(boxes)).law.response()
+    task = learn([Demonstration(eight(), Environment(THREE)), Demonstration(walk, Environment(boxes))])
+    assert task.model.outliers() == () and len(task.environment) == 3
+    assert np.isfinite(task.association.weights).all()
+    np.testing.assert_allclose(task.association.weights.sum(axis=1), 1)
+    assert np.linalg.norm(task.law.subgoals[-1] - eight()[-1]) < 0.1
+    moved = task.adapt(Environment(THREE + 0.2))
+    np.testing.assert_allclose(moved.law.subgoals, task.law.subgoals + 0.2, atol=1e-6)
 
 
 def test_a_wrong_demonstration_does_not_drag_the_others():

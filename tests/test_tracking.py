@@ -11,10 +11,14 @@ from hypothesis import strategies as st
 
 from dollop.tracking import (
     Motion,
+    Track,
     Tracker,
+    draw_particles,
     identify_user,
     match_greedily,
     match_jointly,
+    move_particles,
+    particle_moments,
     predict,
     smooth,
     track_objects,
@@ -87,6 +91,32 @@ def test_smoother_agrees_with_filterpy():
     np.testing.assert_allclose(velocities[:, 0], smoothed[:, 1, 0], atol=1e-8)
 
 
+@pytest.mark.parametrize("order", [2, 3])
+def test_smoothing_is_the_posterior_mean_through_gaps_and_an_uneven_clock(order):
+    """Filter and backward pass together equal solving for all states at once, occlusions and dropped scans included."""
+    rng, motion, n = np.random.default_rng(3), Motion(order=order, noise=0.3, measurement_sd=0.1), 12
+    t = np.cumsum(rng.choice([0.1, 0.2, 0.35], n))
+    z = rng.normal(size=(n, 2)).cumsum(axis=0)
+    z[[3, 4, 8]] = np.nan
+    rows, values, first = [], [], np.zeros((order, n * order))
+    first[:, :order] = np.diag([1 / motion.measurement_sd, 1, 1][:order])
+    rows.append(first)
+    values.append(first[:, :order] @ np.vstack([z[:1], np.zeros((order - 1, 2))]))
+    for i in range(1, n):
+        F, Q = motion.transition(t[i] - t[i - 1])
+        step = np.zeros((order, n * order))
+        step[:, (i - 1) * order : (i + 1) * order] = np.hstack([-F, np.eye(order)])
+        rows.append(np.linalg.solve(np.linalg.cholesky(Q), step))
+        values.append(np.zeros((order, 2)))
+        if np.isfinite(z[i, 0]):
+            rows.append(np.eye(1, n * order, i * order) / motion.measurement_sd)
+            values.append(z[i : i + 1] / motion.measurement_sd)
+    states = np.linalg.lstsq(np.vstack(rows), np.vstack(values), rcond=None)[0].reshape(n, order, 2)
+    positions, velocities = smooth(t, z, motion)
+    np.testing.assert_allclose(positions, states[:, 0], atol=1e-6)
+    np.testing.assert_allclose(velocities, states[:, 1], atol=1e-6)
+
+
 costs = st.integers(0, 5).flatmap(
     lambda k: st.integers(0, 5).flatmap(
         lambda m: st.lists(st.lists(st.floats(0, 10), min_size=m, max_size=m), min_size=k, max_size=k).map(
@@ -139,6 +169,18 @@ def test_the_gate_grows_with_the_occlusion():
     assert len(track_objects(T, objects, Tracker(gate_max=0.8))) == 2
 
 
+@pytest.mark.parametrize(
+    ("first", "jump", "tracks"),
+    [(60, 0.47, 1), (60, 0.53, 2), (20, 1.45, 1), (20, 1.55, 2)],
+    ids=["seen all along", "beyond 0.5 m", "four seconds out of sight", "beyond 1.5 m"],
+)
+def test_the_gate_is_half_a_metre_at_least_and_a_metre_and_a_half_at_most(first, jump, tracks):
+    """From a prediction that is well known an object may be 0.5 m off; after four seconds out of sight, 1.5 m."""
+    still = straight([2, 2], [0, 0])
+    still[60:] += [0.6 * jump, 0.8 * jump]
+    assert len(track_objects(T, seen(still, hide=[(0, first, 60)]))) == tracks
+
+
 def test_an_object_out_of_sight_for_too_long_has_disappeared():
     """After `disappear_after` seconds the same place bears a new track; the old one ends where it was last seen."""
     still = straight([2, 2], [0, 0])
@@ -146,6 +188,13 @@ def test_an_object_out_of_sight_for_too_long_has_disappeared():
     assert len(track_objects(T, objects, Tracker(disappear_after=5.0))) == 1
     tracks = track_objects(T, objects, Tracker(disappear_after=3.0))
     assert [track.t[-1] for track in tracks] == pytest.approx([T[19], T[-1]])
+
+
+def test_one_disappears_while_others_stay():
+    """What has been out of sight for too long is forgotten also while another object is seen all along."""
+    there, gone = straight([5, 5], [0, 0]), straight([2, 2], [0, 0])
+    tracks = track_objects(T, seen(there, gone, hide=[(1, 20, 60)]), Tracker(disappear_after=3.0))
+    assert [(track.t[0], track.t[-1]) for track in tracks] == [(T[0], T[-1]), (T[0], T[19]), (T[60], T[-1])]
 
 
 @pytest.mark.parametrize("matching", ["greedy", "joint"])
@@ -159,6 +208,20 @@ def test_crossing_objects_keep_their_identity(matching, occlusion):
     assert len(tracks) == 2
     for track, truth in zip(tracks, (walker, can), strict=True):
         assert np.abs(track.positions - truth).max() < 0.35
+
+
+def test_particles_without_a_laser_are_the_kalman_prediction():
+    """Drawn and moved particles have the mean and the covariance that the Kalman filter predicts."""
+    rng, motion = np.random.default_rng(0), Motion(noise=2.0)
+    mean, P = np.array([[1.0, -2.0], [0.5, 0.3]]), np.array([[0.04, 0.03], [0.03, 0.5]])
+    F, Q = motion.transition(0.4)
+    cloud = draw_particles(mean, P, rng, count=20_000)
+    for particles, truth in ((cloud, (mean, P)), (move_particles(cloud, F, Q, rng), (F @ mean, F @ P @ F.T + Q))):
+        moments = particle_moments(particles)
+        np.testing.assert_allclose(moments[0], truth[0], atol=0.03)
+        np.testing.assert_allclose(moments[1], truth[1], atol=0.03)
+        spread = particles - moments[0]
+        np.testing.assert_allclose(np.einsum("pi,pj->ij", spread[..., 0], spread[..., 1]) / 20_000, 0, atol=0.03)
 
 
 def test_particles_do_not_wait_where_the_laser_sees_nobody():
@@ -181,6 +244,40 @@ def test_the_user_is_the_fastest_and_survives_a_loss():
     assert user.occluded.sum() == 5
 
 
+EIGHTHS = np.arange(80) / 8  # exact in binary, so that times can be compared
+
+
+def moved_at(speeds, occluded=False):
+    """A track of the given speeds (80,) at EIGHTHS."""
+    speeds = np.broadcast_to(speeds, EIGHTHS.shape)
+    still = np.zeros((len(EIGHTHS), 2))
+    return Track(EIGHTHS, still, np.column_stack([speeds, 0 * speeds]), np.broadcast_to(occluded, EIGHTHS.shape), still)
+
+
+@pytest.mark.parametrize(
+    ("rival", "taken_over"),
+    [
+        (np.where(EIGHTHS >= 5, 1.35, 0.0), 5.5),
+        (np.where(EIGHTHS >= 5, 1.25, 0.0), np.inf),
+        (np.where((EIGHTHS >= 5) & (EIGHTHS < 5.5), 1.35, 0.0), np.inf),
+    ],
+    ids=["faster", "hardly faster", "soon slower"],
+)
+def test_another_takes_over_when_it_has_been_clearly_faster_for_a_while(rival, taken_over):
+    """The first to move is the user once half a second old and as long fast; 0.3 m/s faster for as long takes over."""
+    users = identify_user(EIGHTHS, [moved_at(1.0), moved_at(rival)])
+    expected = np.where(EIGHTHS >= 1.0, 0, -1)
+    expected[np.greater_equal(EIGHTHS, taken_over)] = 1
+    np.testing.assert_array_equal(users, expected)
+
+
+def test_out_of_sight_the_user_stays_the_user():
+    """Who is the user stays so while occluded, though a slower one is seen; what is only ever occluded never is."""
+    slow = moved_at(1.0)
+    assert (identify_user(EIGHTHS, [moved_at(2.0, EIGHTHS >= 4), slow])[EIGHTHS > 2] == 0).all()
+    assert (identify_user(EIGHTHS, [moved_at(2.0, EIGHTHS >= 0), slow])[EIGHTHS > 2] == 1).all()
+
+
 def test_nobody_moves_nobody_is_the_user():
     """Noise on static objects does not make a user of one."""
     cans = straight([1, 1], [0, 0]), straight([3, 3], [0, 0])
@@ -196,12 +293,19 @@ def test_no_objects_no_tracks():
 
 
 @pytest.mark.parametrize(
-    "choice",
-    [dict(matching="best"), dict(occlusion="hope"), dict(gate=0), dict(gate_min=-1), dict(disappear_after=np.nan)],
+    ("choice", "says"),
+    [
+        ({"matching": "best"}, r"matching must be one of \['greedy', 'joint'\], got 'best'"),
+        ({"occlusion": "hope"}, "occlusion must be 'kalman' or 'particles', got 'hope'"),
+        ({"gate": 0}, "gate must be positive, got 0"),
+        ({"gate_min": -1}, "gate_min must be positive, got -1"),
+        ({"gate_max": -0.5}, "gate_max must be positive, got -0.5"),
+        ({"disappear_after": np.nan}, "disappear_after must be positive, got nan"),
+    ],
 )
-def test_choices_out_of_range_are_named(choice):
+def test_choices_out_of_range_are_named(choice, says):
     """An error names the parameter, its value and the rule."""
-    with pytest.raises(ValueError, match=next(iter(choice))):
+    with pytest.raises(ValueError, match=says):
         Tracker(**choice)
 
 

@@ -1,0 +1,202 @@
+"""Evidence, merging and structure of Sec. V: closed forms, and the best of all on small cases."""
+
+from itertools import combinations, pairwise, product
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_t
+
+from dollop.evidence import (
+    END,
+    FIRST,
+    START,
+    Graph,
+    Prior,
+    chains_of,
+    emission_evidence,
+    emission_table,
+    evidence_of,
+    graph_of,
+    outer_products,
+    prior_over,
+    transition_evidence,
+)
+from dollop.merging import Merging, merge_states, reachability, topological_order
+from dollop.structure import align_chain, compact, estimate_structure, mean_place, path_through
+
+
+def prepared(sequences, spread=0.15):
+    chains = chains_of([np.asarray(sequence, float) for sequence in sequences])
+    return chains, prior_over(chains.points, spread)
+
+
+def any_sequences(seed, n, most=5):
+    """Parts of one task with something odd in between: enough likeness to merge, enough strangeness to err."""
+    random = np.random.default_rng(seed)
+    task = random.uniform(-1.5, 1.5, (most, 2))
+    kept = [np.sort(random.choice(most, random.integers(1, most + 1), replace=False)) for _ in range(n)]
+    return [task[each] + random.normal(0, 0.15, (len(each), 2)) for each in kept]
+
+
+# ---- evidence
+
+
+def test_chains_and_prior_are_what_they_say():
+    """Places divide a demonstration evenly; the prior expects states of that spread, as wide apart as the subgoals."""
+    chains, prior = prepared([[(0, 0), (2, 0), (4, 0)], [(0, 0)]], spread=0.5)
+    np.testing.assert_allclose(chains.place, [1 / 4, 2 / 4, 3 / 4, 1 / 2])
+    np.testing.assert_allclose(chains.points[:, 0], [-1.5, 0.5, 2.5, -1.5])
+    assert chains.first.tolist() == [True, False, False, True] and chains.slices == (slice(0, 3), slice(3, 4))
+    assert prior == Prior(kappa=pytest.approx(0.5**2 / (11 / 8)), nu=8.0, psi=pytest.approx(5 * 0.5**2))
+    assert prior_over(chains.points / 1000, 0.5).kappa == 1
+
+
+def test_emission_evidence_is_the_product_of_predictions():
+    """The closed form equals predicting subgoal after subgoal by Student's t, each from those before it."""
+    points = np.random.default_rng(0).normal(0, 0.3, (6, 2))
+    prior = Prior(kappa=0.04, nu=8.0, psi=0.1)
+    expected = 0.0
+    for n, point in enumerate(points):
+        seen = points[:n]
+        kappa, nu, centre = prior.kappa + n, prior.nu + n, seen.sum(0) / (prior.kappa + n)
+        scale = prior.psi * np.eye(2) + seen.T @ seen - kappa * np.outer(centre, centre)
+        shape = scale * (kappa + 1) / (kappa * (nu - 1))
+        expected += multivariate_t(centre, shape, df=nu - 1).logpdf(point)
+    table = emission_table(prior, len(points))
+    evidence = emission_evidence(len(points), points.sum(0), outer_products(points).sum(0), prior, table)
+    assert evidence == pytest.approx(expected)
+
+
+def test_transition_evidence_is_the_product_of_predictions():
+    """The closed form equals predicting step after step with one count for every edge, in any order of the steps."""
+    counts = np.array([[0, 3, 1, 2], [0, 0, 0, 0], [0, 4, 0, 0], [0, 0, 0, 0]])
+    steps = np.random.default_rng(0).permutation(np.repeat([1, 2, 3], [3, 1, 2]))
+    expected, seen = 0.0, dict.fromkeys([1, 2, 3], 1)
+    for step in steps:
+        expected += np.log(seen[step] / sum(seen.values()))
+        seen[step] += 1
+    assert transition_evidence(counts) == pytest.approx([expected, 0, 0, 0])
+
+
+# ---- merging
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_reachability_is_the_transitive_closure(seed):
+    """Which node reaches which equals multiplying the edges out, on random acyclic graphs in any numbering."""
+    random = np.random.default_rng(seed)
+    order = random.permutation(8)
+    counts = np.triu(random.random((8, 8)) < 0.3, k=1).astype(int)[np.ix_(order, order)]
+    closure = np.linalg.matrix_power(np.eye(8, dtype=int) + counts, 8) > 0
+    np.testing.assert_array_equal(reachability(counts), closure)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_gains_kept_up_to_date_are_the_gains_of_evidence(seed):
+    """After every merge the gain of each pair equals the evidence computed anew with that pair merged."""
+    chains, prior = prepared(any_sequences(seed, 4))
+    merging = Merging(np.arange(len(chains.points)) + FIRST, chains, prior)
+    gain = np.inf
+    while gain > 0:
+        before = evidence_of(merging.labels, chains, prior)
+        for a, b in np.argwhere(~merging.blocked):
+            merged = np.where(merging.labels == merging.names[b], merging.names[a], merging.labels)
+            assert merging.gain[a, b] == pytest.approx(evidence_of(merged, chains, prior) - before, abs=1e-9)
+        u, v, gain = merging.best()
+        if gain > 0:
+            merging.merge(u, v)
+
+
+# ---- structure
+
+
+def alignments(length, nodes):
+    """Every way to send subgoals in order to some of `nodes` in order, the others (-1) to states of their own."""
+    for shared in range(min(length, len(nodes)) + 1):
+        for subgoals in combinations(range(length), shared):
+            for chosen in combinations(nodes, shared):
+                chain = np.full(length, -1)
+                chain[list(subgoals)] = chosen
+                yield chain
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_alignment_is_the_best_of_all(seed):
+    """The alignment of one demonstration with the graph of others gains the most evidence of all that keep an order."""
+    sequences = any_sequences(seed, 3, most=4)
+    chains, prior = prepared(sequences)
+    rest = chains.slices[0].stop
+    labels = compact(merge_states(np.arange(len(chains.points)) + FIRST, chains, prior))
+    labels[:rest] = START
+    labels[rest:] = compact(labels[rest:])
+    graph = graph_of(labels, chains)
+    place = mean_place(labels, chains, len(graph.n))
+    table = emission_table(prior, len(labels))
+    aligned, gain = align_chain(chains.points[:rest], place, graph, prior, table)
+    order = [node for node in topological_order(graph.counts, place) if node >= FIRST]
+
+    def evidence(chain):
+        own = len(graph.n) + np.arange(rest)
+        return evidence_of(np.concatenate([np.where(chain < 0, own, chain), labels[rest:]]), chains, prior)
+
+    without = emission_evidence(graph.n, graph.s, graph.q, prior, table).sum() + transition_evidence(graph.counts).sum()
+    best = max(evidence(chain) for chain in alignments(rest, order))
+    assert evidence(aligned) == pytest.approx(best)
+    assert gain == pytest.approx(best - without)
+
+
+def partitions(size):
+    """Every set partition of `size` things, as labels from zero."""
+    for labels in product(*(range(i + 1) for i in range(size))):
+        if all(label <= max(labels[:i], default=-1) + 1 for i, label in enumerate(labels)):
+            yield np.array(labels)
+
+
+def is_acyclic(counts):
+    return len(topological_order(counts, np.zeros(len(counts)))) == len(counts)
+
+
+def test_structure_has_nearly_always_the_highest_evidence_of_all():
+    """Of all acyclic structures of three short demonstrations, the most evident one is found in 24 of 25 cases."""
+    every = list(partitions(7))
+    hits = 0
+    for seed in range(25):
+        random = np.random.default_rng(seed)
+        task = random.uniform(-0.5, 0.5, (3, 2))
+        sequences = [task[rows] + random.normal(0, 0.15, (len(rows), 2)) for rows in ([0, 1, 2], [0, 2], [0, 1])]
+        chains, prior = prepared(sequences)
+        graphs = [(labels + FIRST, graph_of(labels + FIRST, chains).counts) for labels in every]
+        best = max(evidence_of(labels, chains, prior) for labels, counts in graphs if is_acyclic(counts))
+        hits += evidence_of(estimate_structure(chains, prior), chains, prior) >= best - 1e-9
+    assert hits >= 24
+
+
+# ---- the most-likely path
+
+
+def all_paths(counts, node=START):
+    if node == END:
+        yield (END,)
+    for successor in np.flatnonzero(counts[node]):
+        for path in all_paths(counts, int(successor)):
+            yield (node, *path)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_most_likely_path_is_the_best_of_all(seed):
+    """On random acyclic graphs no path is more probable, nor as probable with fewer states or with more subgoals."""
+    random = np.random.default_rng(seed)
+    chains = [[START, *np.flatnonzero(random.random(6) < 0.5) + FIRST, END] for _ in range(5)]
+    chains = [chain for chain in chains if len(chain) > 2]
+    counts, n = np.zeros((8, 8), int), np.zeros(8, int)
+    for chain in chains:
+        n[chain[1:-1]] += 1
+        for u, v in pairwise(chain):
+            counts[u, v] += 1
+
+    def merit(path):
+        shares = [counts[u, v] / counts[u].sum() for u, v in pairwise(path)]
+        return round(float(np.prod(shares)), 12), -len(path), n[list(path)].sum()
+
+    path = (START, *path_through(Graph(n, None, None, counts), np.zeros(len(n), int)).tolist(), END)
+    assert merit(path) == max(merit(each) for each in all_paths(counts))
