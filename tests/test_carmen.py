@@ -371,3 +371,33 @@ def test_real_maps(name, shape):
     occupancy, _, resolution = carmen.read_map(path)
     assert occupancy.shape == shape and resolution == 0.1
     assert 0.7 < np.isnan(occupancy).mean() < 0.9 and 0.02 < (occupancy >= 0.5).mean() < 0.1
+
+
+@pytest.mark.parametrize(("kind", "back"), [(0, False), (1, False), (2, True), (99, True)])
+def test_error_codes_are_those_of_a_sick(tmp_path, kind, back):
+    """8.185 m below a stated 8.191 m is an error code of a SICK, and a distance to any other laser."""
+    line = f"ROBOTLASER1 {kind} -0.5 1.0 0.5 8.191 0.01 0 3 1 8.185 8.191 0 1 2 3 4 5 6 0 0 0 0 0 12.5 host 0.1"
+    log = carmen.read_log(write(tmp_path / "a.log", [line]))
+    assert np.isfinite(log.ranges).tolist() == [[True, back, False]]
+
+
+def test_odometry_needs_a_clock_for_half_of_it(tmp_path):
+    """With 15 of 30 messages in order the others are left out with a warning, with 14 of 30 the clock is useless."""
+    for ordered in (15, 14):
+        times = [*range(1, ordered + 1), *[0] * (30 - ordered)]
+        path = write(tmp_path / "a.log", [f"ODOM 0 0 0 0 0 0 {t} host 0" for t in times])
+        if ordered == 15:
+            with pytest.warns(UserWarning, match="left out 15 of 30"):
+                assert len(carmen.read_odometry(path)) == 15
+        else:
+            with pytest.raises(FormatError, match="clock is useless: 16 of 30"):
+                carmen.read_odometry(path)
+
+
+def test_a_written_map_is_read_back_in_place(tmp_path):
+    """Rows stay rows, and the corner of a map that is wider than high comes back x before y."""
+    occupancy = np.array([[0.0, 0.5, np.nan], [1.0, 0.25, 0.75]])
+    carmen.write_map(tmp_path / "a.map", occupancy, (1.5, -2.0), 0.1)
+    read, origin, resolution = carmen.read_map(tmp_path / "a.map")
+    np.testing.assert_array_equal(read, occupancy)
+    assert origin == (1.5, -2.0) and resolution == 0.1

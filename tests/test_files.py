@@ -168,3 +168,21 @@ def test_a_useless_clock_is_replaced_and_said_so(t):
         keep, kept = usable_clock("a.log", t)
     assert len(keep) == 50
     np.testing.assert_allclose(kept, np.arange(50) * 0.1)
+
+
+@pytest.mark.parametrize(("scans", "kept"), [(20, 19), (19, 19)])
+def test_one_scan_in_twenty_may_be_out_of_order(scans, kept):
+    """Exactly one in twenty is left out and the times stay; one in nineteen makes the clock worthless."""
+    t = 5 + np.arange(scans) * 0.5
+    t[3] = 1e9
+    with pytest.warns(UserWarning):
+        keep, times = usable_clock("a.log", t)
+    assert len(keep) == kept and times[-1] == (t[-1] if scans == 20 else 1.8)
+
+
+def test_written_files_can_be_read_by_others(tmp_path):
+    """The temporary file is private; what takes its place has the usual rights."""
+    with whole_file(tmp_path / "a.txt") as stream:
+        stream.write(b"new")
+    (tmp_path / "plain.txt").write_text("new")
+    assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "plain.txt").stat().st_mode

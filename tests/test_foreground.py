@@ -212,3 +212,36 @@ def test_gain_out_of_range_is_named(gain):
     """The error names the value and the rule."""
     with pytest.raises(ValueError, match=r"gain must lie in \(0, 1\]"):
         ForegroundGrid(room(), gain)
+
+
+def test_a_cell_just_before_its_hit_is_not_swept():
+    """A beam sweeps a remembered cell only if it went on for a cell's side beyond it; else the cell keeps its value."""
+    pose = np.array([4.0, 0.5, np.pi / 2])
+    for beyond, value in ((0.04, 0.6), (0.06, 0.6 * 0.4)):
+        grid = ForegroundGrid(room(), 0.6)
+        can = hits(grid, 4.01, 3.01)
+        grid.update(can, pose, ANGLES, np.full(181, 2.525))
+        assert grid.value[can[0]] == pytest.approx(0.6)
+        reach = np.hypot(*(grid.centres(can)[0] - pose[:2])) + beyond
+        grid.update(can[:0], pose, ANGLES, np.full(181, reach))
+        assert grid.value[can[0]] == pytest.approx(value if value > 0.3 else 0.0)
+
+
+def test_surfaces_end_at_a_jump_of_thirty_centimetres():
+    """Neighbouring readings 0.29 m apart are one surface without a gap of a cell, 0.31 m apart they are two."""
+    for gap, added in ((0.29, 5), (0.31, 0), (0.04, 0)):
+        scan, filled = surface_points(np.array([[[0.0, 0.0], [0.6 * gap, 0.8 * gap]]]), np.ones((1, 2), bool))
+        assert len(scan) == 2 + added
+        if added:
+            steps = np.diff(filled[np.argsort(filled[:, 0])], axis=0)
+            np.testing.assert_allclose(np.hypot(*steps.T), gap / 6)
+
+
+def test_occupied_is_above_one_half():
+    """Blobs and objects begin above 0.5: hit twice at a gain of 0.3 is occupied, hit once is not."""
+    grid, pose = ForegroundGrid(room(), 0.3), np.array([4.0, 0.5, np.pi / 2])
+    can = np.concatenate([hits(grid, 3.91 + 0.05 * k, 3.0) for k in range(4)])
+    for value, count in ((0.3, 0), (0.51, 1)):
+        grid.update(can, pose, ANGLES, np.full(181, 2.5))
+        np.testing.assert_allclose(grid.value[can], value)
+        assert len(grid.blobs()) == len(grid.objects()) == count

@@ -387,3 +387,46 @@ def test_real_building():
     assert grid.covers(points).all()
     assert (grid.distance_at(points) <= 0.1).mean() > 0.9
     assert 5_000 < grid.occupied.sum() < 20_000
+
+
+@pytest.mark.parametrize("heading", [0.3, 2.0, -2.5])
+def test_counts_are_those_of_one_beam_at_a_time(heading):
+    """A laser that sees half of a plane: every cell holds hits / (hits + passes), beam by beam and step by step."""
+    rng, golden, resolution = np.random.default_rng(1), (np.sqrt(5) - 1) / 2, 0.1
+    ranges = rng.uniform(0.05, 4.0, (5, 31))
+    ranges[rng.random(ranges.shape) < 0.2] = np.inf
+    ranges[0, :2] = 3.0, 3.001
+    poses = np.column_stack([rng.uniform(-1, 1, (5, 2)), np.full(5, heading)])
+    log = LaserLog(np.arange(5.0), ranges, np.linspace(-1.2, 1.2, 31), poses, 4.0)
+    grid = OccupancyGrid.from_log(log, resolution, max_range=3.0)
+    counts = np.zeros((*grid.occupancy.shape, 2))
+    for scan, (x, y, theta) in enumerate(poses):
+        for beam, reach in enumerate(ranges[scan]):
+            way, hit = np.array([np.cos(theta + log.angles[beam]), np.sin(theta + log.angles[beam])]), reach <= 3.0
+            if hit:
+                counts[(*grid.world_to_cell([x, y] + reach * way), 0)] += 1
+            for step in range(int(min(reach, 3.0) / resolution - np.sqrt(2) * hit)):
+                counts[(*grid.world_to_cell([x, y] + (step + scan * golden % 1) * resolution * way), 1)] += 1
+    with np.errstate(invalid="ignore"):
+        np.testing.assert_allclose(grid.occupancy, counts[..., 0] / counts.sum(axis=-1))
+    seen = grid.cell_centres(np.argwhere(~grid.unknown))
+    assert np.ptp(seen, axis=0).max() + 6 * resolution > np.multiply(grid.occupancy.shape, resolution).max()
+
+
+def test_every_probability_keeps_its_side_in_a_ros_map(tmp_path):
+    """However near to a half, a free cell comes back free, an occupied one occupied, an unknown one unknown."""
+    near = np.append(np.linspace(0, 1, 2001), [np.nextafter(0.5, 0), 0.5, 0.498, 0.502, np.nan])
+    grid = OccupancyGrid(near[None], (0.0, 0.0), 0.05)
+    grid.save(tmp_path / "a.yaml")
+    loaded = OccupancyGrid.load(tmp_path / "a.yaml")
+    for kind in ("occupied", "free", "unknown"):
+        np.testing.assert_array_equal(getattr(loaded, kind), getattr(grid, kind))
+
+
+@pytest.mark.parametrize(
+    "picture", [b"P2 2 1 5\n0 7\n", b"P2 2 1 5\n-1 0\n", b"P5 2 1 300\n" + bytes(2), b"P5 2 1 256\n\0\1"]
+)
+def test_one_bad_pixel_is_enough(tmp_path, picture):
+    """A single pixel out of range among good ones, or more than 255 steps of grey, is refused."""
+    with pytest.raises(FormatError, match="expected"):
+        load_ros(tmp_path, picture=picture)

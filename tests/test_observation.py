@@ -6,11 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rooms import FURNITURE, WALLS, room_map, scan
 
 from dollop import OccupancyGrid, SequencedLDS, Tracker, laps, observe, read_log
+from dollop.foreground import ForegroundGrid
 from dollop.lab import Recording
 from dollop.lab.truth import track_error
-from dollop.observation import completed
+from dollop.laser import LaserLog
+from dollop.observation import completed, foreground_hits, static_boxes
+from dollop.tracking import Track
 from dollop.trajectory import distance_to_polyline, mean_trajectory
 
 DATA = Path(__file__).parents[1] / "data"
@@ -141,3 +145,65 @@ def test_walkers_seen_at_leg_height():
     user = observation.user
     assert user.t[-1] - user.t[0] > 100 and user.occluded.mean() < 0.15
     assert np.ptp(user.positions[:, 1]) > 4.0 and np.quantile(user.speeds, 0.9) < 2.5
+
+
+SENSOR = np.array([4.5, 0.4, np.pi / 2])
+CAN = np.array([2.3, 3.4, 2.7, 3.8])
+
+
+def seen_from_the_sensor(walk, *boxes):
+    """Ten scans a second by a laser that stands: a walker 0.4 m wide at each of (N, 2), nan for away, and boxes."""
+    room = np.vstack([WALLS, FURNITURE, *boxes])
+    places = [np.vstack([room, [*(p - 0.2), *(p + 0.2)]]) if np.isfinite(p[0]) else room for p in np.asarray(walk)]
+    ranges = np.array([scan(SENSOR, each) for each in places])
+    angles = np.deg2rad(np.arange(-90.0, 91.0))
+    return LaserLog(0.1 * np.arange(len(ranges)), ranges, angles, np.tile(SENSOR, (len(ranges), 1)), 20.0)
+
+
+def away(count):
+    return np.full((count, 2), np.nan)
+
+
+def test_losses_are_counted():
+    """Out of sight for six seconds and seen again elsewhere, the user is lost once; never out of sight, never lost."""
+    one, other = np.linspace([2.0, 3.0], [6.0, 3.0], 40), np.linspace([6.5, 4.5], [3.0, 4.5], 35)
+    found = {k: observe(seen_from_the_sensor(np.concatenate([one, away(k), other])), room_map()) for k in (60, 0)}
+    assert found[60].losses == 1 and found[60].user.t[-1] == pytest.approx(13.4)
+    assert observe(seen_from_the_sensor(one), room_map()).losses == 0
+    assert observe(seen_from_the_sensor(away(20)), room_map()).losses == 0
+
+
+def test_a_user_who_stops_is_no_object():
+    """However long the user stands in the end, the can alone is the environment."""
+    walk = np.concatenate([np.linspace([3.5, 2.5], [6.0, 2.5], 25), np.tile([6.0, 2.5], (100, 1))])
+    observation = observe(seen_from_the_sensor(walk, CAN), room_map())
+    np.testing.assert_allclose(observation.environment.boxes, [CAN], atol=0.12)
+
+
+@pytest.mark.parametrize(("there", "objects"), [(slice(0, 30), 1), (slice(35, 40), 0)], ids=["before", "at last"])
+def test_where_the_user_stood_last_is_no_object(there, objects):
+    """A blob where the user was in the last second is the user; one that the user left before is an object."""
+    log, grid = seen_from_the_sensor(away(1), CAN), ForegroundGrid(room_map(), 0.6)
+    grid.update(foreground_hits(log, room_map())[0], SENSOR, log.angles, log.ranges[0])
+    places = np.tile([7.0, 2.0], (40, 1))
+    places[there] = 2.5, 3.6
+    user = Track(0.1 * np.arange(40), places, np.zeros((40, 2)), np.zeros(40, bool), places)
+    assert len(static_boxes(grid, SENSOR[:2], user)) == objects
+
+
+@pytest.mark.parametrize(("scans", "objects"), [(30, 0), (31, 1)])
+def test_what_stands_for_three_seconds_is_static(scans, objects):
+    """1 - 0.9^n exceeds a half at the seventh look of the slow grid, and every fifth scan is one."""
+    observation = observe(seen_from_the_sensor(away(scans), CAN), room_map())
+    assert len(observation.environment) == objects and observation.user is None
+
+
+@pytest.mark.parametrize("quarters", range(4))
+def test_cells_become_a_square_away_from_the_sensor(quarters):
+    """Four cells, two of them behind the third, from any of four sides: as deep as wide, from edge to edge of cells."""
+    turn = np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), quarters)
+    seen = np.array([[1.85, 3.0], [2.05, 3.0], [2.05, 3.05], [2.05, 3.1]]) @ turn.T
+    tight = np.concatenate([seen.min(axis=0) - 0.025, seen.max(axis=0) + 0.025])
+    corners = np.array([[1.825, 2.975], [2.075, 3.225]]) @ turn.T
+    expected = np.concatenate([corners.min(axis=0), corners.max(axis=0)])
+    np.testing.assert_allclose(completed(tight, seen, turn @ [2.0, 0.0], 0.05), expected, atol=1e-9)
