@@ -303,8 +303,8 @@ CLAIMS = {
             ),
             "Five figure-eights as they are, and with a second person at half the speed who passes between the robot "
             "and the user; while the user walks. The fastest track in each scan, as the paper says. Our additions: "
-            "only visible objects can become the user, and another one takes over only after having been faster by 0.3 m/s "
-            "for 0.5 s.",
+            "only visible objects can become the user, and another one takes over only after having been faster by "
+            "0.3 m/s for 0.5 s.",
         ),
         Claim(
             "loss",
