@@ -146,8 +146,8 @@ def associate(subgoals, environment, m=4):
     corners = environment.corners
     if len(corners) == 0:
         raise ValueError("subgoals can only be associated with an environment of at least 1 object, got 0")
-    if not 1 <= m <= len(corners):
-        raise ValueError(f"m must be between 1 and the number of corners {len(corners)}, got {m}")
+    if m not in range(1, len(corners) + 1):
+        raise ValueError(f"m must be a whole number between 1 and the number of corners {len(corners)}, got {m}")
     differences = subgoals[:, None] - corners
     squares = (differences**2).sum(axis=2)
     nearest = np.argsort(squares, axis=1, kind="stable")[:, :m]
