@@ -356,6 +356,9 @@ def _parse_odometry(fields):
     return _numbers(fields, 1, 7)
 
 
+OCCUPIED_FROM = 0.5
+"""Probability from which a cell is occupied (`occupied_prob` in CARMEN's parameters)."""
+
 MAP_LABEL = b"CARMENMAPFILEv020"
 GRIDMAP_CHUNK, NAMED_CHUNK = 1, 128
 

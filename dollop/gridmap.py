@@ -1,9 +1,5 @@
 """Occupancy grid maps: built from a laser log with known poses, read and written as ROS and CARMEN maps."""
 
-import io
-import json
-import os
-import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,12 +7,10 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from dollop import carmen
-from dollop.files import FormatError, read_bytes, whole_file
+from dollop import carmen, rosmap
+from dollop.carmen import OCCUPIED_FROM
+from dollop.files import FormatError
 from dollop.laser import check_positive
-
-OCCUPIED_FROM = 0.5
-"""Probability from which a cell is occupied (CARMEN's `occupied_prob`)."""
 
 MAX_CELLS = 100_000_000
 
@@ -132,7 +126,7 @@ class OccupancyGrid:
         """
         path = Path(path)
         check_is_map(path)
-        content = carmen.read_map(path) if path.suffix == ".map" else _read_ros_map(path)
+        content = carmen.read_map(path) if path.suffix == ".map" else rosmap.read_map(path)
         try:
             return cls(*content)
         except ValueError as error:
@@ -150,10 +144,8 @@ class OccupancyGrid:
         """
         path = Path(path)
         check_is_map(path)
-        if path.suffix == ".map":
-            carmen.write_map(path, self.occupancy, self.origin, self.resolution)
-        else:
-            _write_ros_map(path, self)
+        write_map = carmen.write_map if path.suffix == ".map" else rosmap.write_map
+        write_map(path, self.occupancy, self.origin, self.resolution)
 
     @property
     def occupied(self):
@@ -302,159 +294,3 @@ def _beam_samples(log, scans, reach, is_hit, resolution):
 def _flat(points, origin, resolution, shape):
     cols, rows = np.floor((points - origin) / resolution).astype(int).T
     return rows * shape[1] + cols
-
-
-# ROS map_server (http://wiki.ros.org/map_server): a YAML of flat keys, and an image whose first row is the highest y.
-# Grey v means the probability (255 - v) / 255, unless `negate`. Our own thresholds make 127 and 128 the unknown.
-UNKNOWN_GREY = (127, 128)
-ROS_MAP = """image: {image}
-mode: trinary
-resolution: {resolution!r}
-origin: [{origin[0]!r}, {origin[1]!r}, 0.0]
-negate: 0
-occupied_thresh: 0.505
-free_thresh: 0.495
-"""
-
-
-def _write_ros_map(path, grid):
-    image = path.with_suffix(".pgm")
-    grey = np.rint(255 * (1 - np.nan_to_num(grid.occupancy)))
-    grey = np.where(grid.occupied, np.minimum(grey, UNKNOWN_GREY[0] - 1), np.maximum(grey, UNKNOWN_GREY[1] + 1))
-    grey = np.where(grid.unknown, UNKNOWN_GREY[0], grey).astype(np.uint8)
-    height, width = grey.shape
-    # A name that could mean something else to YAML goes in quotes, in which YAML reads what JSON writes.
-    name = image.name if re.fullmatch(r"\w[\w.-]*", image.name) else json.dumps(image.name, ensure_ascii=False)
-    text = ROS_MAP.format(image=name, resolution=grid.resolution, origin=grid.origin)
-    with whole_file(path) as stream, whole_file(image) as picture:
-        stream.write(text.encode("utf-8", "surrogateescape"))
-        stream.flush()  # so that nothing is left to fail once the picture has its name
-        picture.write(b"P5\n%d %d\n255\n" % (width, height) + grey[::-1].tobytes())
-
-
-def _read_ros_map(path):
-    keys = _flat_yaml(path)
-    for key in ("image", "resolution", "origin"):
-        if key not in keys:
-            raise FormatError(f"the key {key!r} is missing", path)
-    resolution = _number(path, keys, "resolution")
-    origin = [_as_number(path, "origin", text) for text in _items(keys["origin"])]
-    # A millionth of a radian is a tenth of a millimetre in a hundred metres: the rounding of some other program.
-    if len(origin) != 3 or not abs(origin[2]) <= 1e-6:
-        raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {keys['origin']!r}", path)
-    # os.path and not pathlib, which lets names that are too long or hold a zero byte through as other errors.
-    if not os.path.isfile(path.parent / keys["image"]):
-        raise FormatError(f"its picture {keys['image']!r} is missing", path)
-    grey = _read_picture(path.parent / keys["image"])[::-1]
-    return _ros_occupancy(path, keys, grey), origin[:2], resolution
-
-
-def _ros_occupancy(path, keys, grey):
-    """Probabilities by the map's `mode`, set so that occupied and free cells are what the file's thresholds say."""
-    mode, negate = keys.get("mode", "trinary"), keys.get("negate", "0")
-    if mode not in ("trinary", "scale", "raw"):
-        raise FormatError(f"mode must be trinary, scale or raw, got {mode!r}", path)
-    if negate.lower() not in ("0", "false", "1", "true"):
-        raise FormatError(f"negate must be 0, 1, false or true, got {negate!r}", path)
-    above, below = _number(path, keys, "occupied_thresh", 0.65), _number(path, keys, "free_thresh", 0.196)
-    if not 0 <= below <= above <= 1:
-        rule = "thresholds must be 0 <= free_thresh <= occupied_thresh <= 1"
-        raise FormatError(f"{rule}, got free_thresh {below:g} and occupied_thresh {above:g}", path)
-    if mode == "raw":
-        return np.where(grey <= 100, grey / 100, np.nan)
-    probability = (grey if negate.lower() in ("1", "true") else 255 - grey) / 255
-    occupied, free = probability > above, probability < below
-    between = np.nan if mode == "trinary" else probability
-    just_free = np.nextafter(OCCUPIED_FROM, 0)
-    certain = np.where(occupied, np.maximum(probability, OCCUPIED_FROM), np.minimum(probability, just_free))
-    return np.where(occupied | free, certain, between)
-
-
-def _flat_yaml(path):
-    """Keys and values of a YAML file that has no nesting but lists, which is all that maps need; a value is text."""
-    keys, key = {}, None
-    lines = read_bytes(path).decode("utf-8", "surrogateescape").split("\n")
-    for number, line in enumerate(lines, 1):
-        entry = re.match(r"\s*(\w+)\s*:(?:\s+(.*))?$", line)
-        if entry:
-            key, keys[entry[1]] = entry[1], _scalar(path, number, entry[2] or "")
-            continue
-        text = _scalar(path, number, line)
-        if not text or text in ("---", "..."):
-            continue
-        if key is None or not (line[0] in " \t-" or keys[key].startswith("[")):
-            raise FormatError(f"expected 'key: value', got {text[:40]!r}", path, number)
-        keys[key] = f"{keys[key]} {text}".strip()
-    return keys
-
-
-def _scalar(path, number, text):
-    """A value of YAML without its comment and its quotes."""
-    text = text.strip()
-    quoted = re.match(r"""("(?:\\.|[^"\\])*"|'(?:''|[^'])*')\s*(?:#.*)?$""", text)
-    if not quoted:
-        return re.sub(r"(^|\s)#.*", "", text).strip()
-    if text.startswith("'"):
-        return quoted[1][1:-1].replace("''", "'")
-    # JSON reads what stands in double quotes, but for YAML's \xE9, which is its \u00E9.
-    text = re.sub(r"\\(x?)(.)", lambda m: rf"\u00{m[2]}" if m[1] else m[0], quoted[1])
-    try:
-        return json.loads(text, strict=False)
-    except ValueError:
-        raise FormatError(f"quotes that cannot be read: {quoted[1][:40]!r}", path, number) from None
-
-
-def _items(text):
-    """The items of a list of numbers, written in brackets or with a dash before each."""
-    return re.split(r"(?:^|\s)-\s", text)[1:] if text.startswith("- ") else text.strip("[]").split(",")
-
-
-def _number(path, keys, key, default=None):
-    return default if key not in keys else _as_number(path, key, keys[key])
-
-
-def _as_number(path, key, text):
-    try:
-        return float(text)
-    except ValueError:
-        raise FormatError(f"{key} must be a number, got {text!r}", path) from None
-
-
-def _read_picture(path):
-    """Grey values (H, W) from 0 to 255 of a PGM or PNG picture, told by its content."""
-    content = read_bytes(path)
-    return _png(path, content) if content.startswith(b"\x89PNG") else _pgm(path, content)
-
-
-def _png(path, content):
-    """The mean of the colours, as in map_server; a transparent pixel has no meaning in a map."""
-    from matplotlib.image import imread  # not needed, and slow to import, for any other map
-
-    try:
-        pixels = np.atleast_3d(imread(io.BytesIO(content), format="png"))
-    except Exception as error:  # Pillow meets a broken picture with whatever its parsers happen to raise
-        raise FormatError(f"not a readable PNG picture ({error})", path) from None
-    colours = 1 if pixels.shape[2] < 3 else 3
-    if (pixels[..., colours:] < 1).any():
-        raise FormatError("a map must have no transparent pixels", path)
-    return np.rint(255 * pixels[..., :colours].mean(axis=2))
-
-
-def _pgm(path, content):
-    """Grey values (H, W) of a binary (P5) or plain (P2) PGM of at most 255 steps, scaled to 255."""
-    head = re.match(rb"(P[25])(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)\s", content)
-    if not head:
-        raise FormatError("neither a PNG nor a PGM picture (P5 or P2)", path)
-    width, height, steps = (int(number) for number in head.groups()[1:])
-    if not (width > 0 and height > 0 and 0 < steps <= 255):
-        raise FormatError(f"a PGM of {width} x {height} pixels and {steps} steps, expected up to 255 steps", path)
-    body = content[head.end() :]
-    try:
-        pixels = np.frombuffer(body, np.uint8) if head[1] == b"P5" else np.array(body.split(), dtype=int)
-    except ValueError:
-        raise FormatError("a pixel that is no number", path) from None
-    if pixels.size < width * height:
-        raise FormatError(f"{pixels.size} pixels, expected {width} x {height}", path)
-    if pixels.min() < 0 or pixels.max() > steps:
-        raise FormatError(f"pixels from {pixels.min()} to {pixels.max()}, expected 0 to {steps}", path)
-    return pixels[: width * height].reshape(height, width) * (255 / steps)

@@ -1,0 +1,150 @@
+"""Maps of ROS map_server: a YAML of flat keys that names a picture (http://wiki.ros.org/map_server).
+
+Grey v of the picture, whose first row is the highest y, means the probability (255 - v) / 255, unless `negate`.
+"""
+
+import os
+
+import numpy as np
+import yaml
+from PIL import Image
+
+from dollop.carmen import OCCUPIED_FROM
+from dollop.files import FormatError, read_bytes, whole_file
+
+UNKNOWN_GREY = (127, 128)
+"""Written maps have thresholds that make these two greys, and no other, the unknown."""
+
+RIGHT_ANGLED = 1e-6
+"""A turn in rad that counts as none: it moves what is a hundred metres away by a tenth of a millimetre."""
+
+
+def write_map(path, occupancy, origin, resolution):
+    """Write a map as YAML with a PGM of the same name beside it; both appear, or neither.
+
+    Parameters
+    ----------
+    path : Path
+        The YAML.
+    occupancy : (H, W) float array
+        Probabilities, NaN where unknown; row 0 has the lowest y.
+    origin : (float, float)
+        Lower left corner, x, y in m.
+    resolution : float
+        Side of a cell in m.
+    """
+    image = path.with_suffix(".pgm")
+    grey = np.rint(255 * (1 - np.nan_to_num(occupancy)))
+    occupied = occupancy >= OCCUPIED_FROM
+    grey = np.where(occupied, np.minimum(grey, UNKNOWN_GREY[0] - 1), np.maximum(grey, UNKNOWN_GREY[1] + 1))
+    grey = np.where(np.isnan(occupancy), UNKNOWN_GREY[0], grey).astype(np.uint8)
+    keys = {
+        "image": image.name,
+        "mode": "trinary",
+        "resolution": float(resolution),
+        "origin": [float(origin[0]), float(origin[1]), 0.0],
+        "negate": 0,
+        "occupied_thresh": 0.505,
+        "free_thresh": 0.495,
+    }
+    with whole_file(path) as stream, whole_file(image) as picture:
+        stream.write(yaml.safe_dump(keys, sort_keys=False, default_flow_style=None, allow_unicode=True).encode())
+        stream.flush()  # so that nothing is left to fail once the picture has its name
+        Image.fromarray(grey[::-1]).save(picture, "PPM")
+
+
+def read_map(path):
+    """Read a map.
+
+    Parameters
+    ----------
+    path : Path
+        The YAML; its picture may be any that Pillow reads, such as PGM and PNG.
+
+    Returns
+    -------
+    occupancy : (H, W) float array
+        Probabilities, NaN where unknown; row 0 has the lowest y. Occupied and free cells are what the file's thresholds
+        say.
+    origin : list of two float
+        Lower left corner, x, y in m.
+    resolution : float
+        m.
+
+    Raises
+    ------
+    FormatError
+        If the YAML or its picture is not in order.
+    """
+    keys = read_keys(path)
+    for key in ("image", "resolution", "origin"):
+        if key not in keys:
+            raise FormatError(f"the key {key!r} is missing", path)
+    origin = keys["origin"] if isinstance(keys["origin"], list) else []
+    origin = [number(path, "origin", value) for value in origin]
+    if len(origin) != 3 or not abs(origin[2]) <= RIGHT_ANGLED:
+        raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {keys['origin']!r}", path)
+    resolution = number(path, "resolution", keys["resolution"])
+    grey = read_grey(path, str(keys["image"]))[::-1]
+    return probabilities(path, keys, grey), origin[:2], resolution
+
+
+def read_keys(path):
+    """What the YAML holds, a dict."""
+    try:
+        keys = yaml.safe_load(read_bytes(path))
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date that is none
+        raise FormatError(f"not YAML: {' '.join(str(error).split())}", path) from None
+    if not isinstance(keys, dict):
+        raise FormatError(f"expected 'key: value' in each line, got {str(keys)[:40]!r}", path)
+    return keys
+
+
+def number(path, key, value):
+    """The value as a float: YAML takes 1e-9, without a point, for text."""
+    try:
+        if isinstance(value, bool):
+            raise ValueError
+        return float(value)
+    except (TypeError, ValueError):
+        raise FormatError(f"{key} must be a number, got {value!r}", path) from None
+
+
+def read_grey(path, name):
+    """Grey values (H, W) from 0 to 255 of the picture beside a map, of a coloured one the mean as in map_server."""
+    # os.path and not pathlib, which lets names that are too long or hold a zero byte through as other errors.
+    if not os.path.isfile(path.parent / name):
+        raise FormatError(f"its picture {name!r} is missing", path)
+    try:
+        with Image.open(path.parent / name) as picture:
+            if picture.mode.startswith("I"):  # sixteen bits
+                return np.asarray(picture) / 257
+            colours = np.asarray(picture.convert("RGBA"), float)
+    except Exception as error:  # Pillow meets a broken picture with whatever its parsers happen to raise
+        raise FormatError(f"not a readable picture ({error})", path.parent / name) from None
+    if (colours[..., 3] < 255).any():
+        raise FormatError("a map must have no transparent pixels", path.parent / name)
+    return colours[..., :3].mean(axis=2)
+
+
+def probabilities(path, keys, grey):
+    """Probabilities by the map's `mode`, set so that occupied and free cells are what the file's thresholds say."""
+    mode, negate = keys.get("mode", "trinary"), keys.get("negate", 0)
+    if mode not in ("trinary", "scale", "raw"):
+        raise FormatError(f"mode must be trinary, scale or raw, got {mode!r}", path)
+    if negate not in (0, 1):  # or false and true
+        raise FormatError(f"negate must be 0, 1, false or true, got {negate!r}", path)
+    above, below = (
+        number(path, key, keys.get(key, usual)) for key, usual in (("occupied_thresh", 0.65), ("free_thresh", 0.196))
+    )
+    if not 0 <= below <= above <= 1:
+        rule = "thresholds must be 0 <= free_thresh <= occupied_thresh <= 1"
+        raise FormatError(f"{rule}, got free_thresh {below:g} and occupied_thresh {above:g}", path)
+    if mode == "raw":
+        return np.where(grey <= 100, grey / 100, np.nan)
+    probability = (grey if negate else 255 - grey) / 255
+    occupied, free = probability > above, probability < below
+    between = np.nan if mode == "trinary" else probability
+    just_free = np.nextafter(OCCUPIED_FROM, 0)
+    certain = np.where(occupied, np.maximum(probability, OCCUPIED_FROM), np.minimum(probability, just_free))
+    return np.where(occupied | free, certain, between)
