@@ -24,6 +24,8 @@ ROBOT_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
 KEPT, INFLUENCE = 0.20, 0.50
 """Distance in m between the robot's edge and an obstacle that the modulation keeps, and at which it sets in."""
+TIGHT = KEPT / 3
+"""Distance in m between the robot's edge and an obstacle that the shortest ways keep."""
 FREE_BELOW = 0.2
 """Occupancy below which a cell is trusted to be free: a stool's thin column is missed by most beams in its cell."""
 CROWDING = 4.0
@@ -110,6 +112,10 @@ class ObstacleMap:
         slope_x = ((b - a) * (1 - top) + (d - c) * top) / self.resolution
         return lower + top * (upper - lower) - self.radius, slope_x, (upper - lower) / self.resolution
 
+    def cuts_corner(self, x, y, ahead_x, ahead_y):
+        """Whether half-way on the straight line from x, y to another place, in m, the robot has next to no room."""
+        return self.edge((x + ahead_x) / 2, (y + ahead_y) / 2) <= TIGHT
+
     def edges(self, positions):
         """`edge` for (N, 2) positions in m at once: (N,)."""
         at = (np.asarray(positions)[:, ::-1] - np.array(self.origin)[::-1]) / self.resolution - 0.5
@@ -143,13 +149,13 @@ class ObstacleMap:
         """
         edge, nx, ny = self.edge_and_slope(x, y)
         if edge <= 0.02:
-            return 0.05 if nx * cos(theta) + ny * sin(theta) > 0.2 else 0.0
+            return 0.05 if nx * cos(theta) + ny * sin(theta) > 0.05 else 0.0
         return deceleration * (sqrt(period * period + 2 * edge / deceleration) - period)
 
     @cached_property
     def passable(self):
         """(H, W) bool array: cells where the robot touches nothing, with some room to spare."""
-        return self.distances - self.radius > KEPT / 3
+        return self.distances - self.radius > TIGHT
 
     @cached_property
     def nearest_passable(self):
@@ -217,11 +223,27 @@ class Geodesic:
         cell = self.obstacles.cell(x, y)
         if self.distances[cell] == inf:
             return 0.0, 0.0
-        for _ in range(AHEAD):
-            cell = self.before[cell] if cell != self.goal_cell else cell
-        ahead_x, ahead_y = self.obstacles.centre(cell)
-        size = hypot(ahead_x - x, ahead_y - y)
-        return ((ahead_x - x) / size, (ahead_y - y) / size) if size > 1e-9 else (0.0, 0.0)
+        edge, nx, ny = self.obstacles.edge_and_slope(x, y)
+        if edge <= TIGHT:  # first to where there is room, and outwards
+            (ux, uy), (nx, ny) = toward(*self.obstacles.centre(cell), x, y), toward(nx, ny, 0.0, 0.0)
+            return toward(ux + nx, uy + ny, 0.0, 0.0)
+        cell = self.onward(cell)
+        for _ in range(AHEAD - 1):
+            farther = self.onward(cell)
+            if self.obstacles.cuts_corner(x, y, *self.obstacles.centre(farther)):
+                break
+            cell = farther
+        return toward(*self.obstacles.centre(cell), x, y)
+
+    def onward(self, cell):
+        """The next cell on the way; the last one stays."""
+        return self.before[cell] if cell != self.goal_cell else cell
+
+
+def toward(ahead_x, ahead_y, x, y):
+    """Unit vector from x, y to another place; zero where they are the same."""
+    size = hypot(ahead_x - x, ahead_y - y)
+    return ((ahead_x - x) / size, (ahead_y - y) / size) if size > 1e-9 else (0.0, 0.0)
 
 
 def open_frame(boxes, places, resolution):

@@ -285,7 +285,7 @@ class Pursuit(Supervisor):
         if distance(self.places[self.at], x, y) > STRAY:
             self.plan(x, y)
         self.advance(x, y)
-        ahead_x, ahead_y = self.places[self.at + LOOK_AHEAD]
+        ahead_x, ahead_y = self.pursued(x, y)
         error = wrap(atan2(ahead_y - y, ahead_x - x) - theta)
         curvature = 2 * sin(error) / max(hypot(ahead_x - x, ahead_y - y), STEP)
         speed = self.pace * min(self.planned[self.at], self.limits.turn / max(abs(curvature), 1e-9))
@@ -294,6 +294,14 @@ class Pursuit(Supervisor):
         if abs(error) > SHARP or speed == 0.0:
             return 0.0, clip(TURN_GAIN * error, self.limits.turn)
         return speed, curvature * speed
+
+    def pursued(self, x, y):
+        """The place 0.35 m ahead on the response, or a nearer one where going straight there would cut a corner."""
+        obstacles = self.guidance.obstacles
+        for place in self.places[self.at + LOOK_AHEAD : self.at + 1 : -1]:
+            if not obstacles or not obstacles.cuts_corner(x, y, *place):
+                return place
+        return self.places[self.at + 1]
 
     def insist(self):
         """As any supervisor does, and roll the response out anew."""

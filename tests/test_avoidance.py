@@ -117,7 +117,7 @@ def test_speed_limit_uses_the_room_there_is(place, theta, deceleration):
     if edge > 0.02:
         assert limit * 0.1 + limit**2 / (2 * deceleration) == pytest.approx(edge)
     else:
-        assert limit == (0.05 if nx * np.cos(theta) + ny * np.sin(theta) > 0.2 else 0.0)
+        assert limit == (0.05 if nx * np.cos(theta) + ny * np.sin(theta) > 0.05 else 0.0)
 
 
 def test_geodesic_is_the_distance_in_the_open():

@@ -1,5 +1,6 @@
 """Performing: the robots' limits, runs that finish or say why not, kidnappings, and bad input."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from dollop.avoidance import INFLUENCE, ObstacleMap
 from dollop.control import PIONEER_LIMITS, Limits
 from dollop.environment import Environment
 from dollop.execution import Search, Unicycle, distances_to_law, free_poses, perform, return_times
+from dollop.gridmap import OccupancyGrid
 from dollop.trajectory import distance_to_polyline
 
 START = (4.5, 3.6, -0.7)
@@ -397,3 +399,12 @@ def test_inputs_are_not_changed(task, background):
     perform(task, Unicycle(START), background=background, kidnap=kidnap)
     assert (task.law.subgoals == subgoals).all() and (background.occupancy == occupancy).all()
     assert (task.environment.boxes == CANS).all() and kidnap == [(3.0, (2.0, 2.0, 0.0))]
+
+
+@pytest.mark.parametrize("control", ["plain", "pursuit"])
+@pytest.mark.parametrize("place", [(7.31, 0.55, -0.79), (7.19, 0.57, -2.81), (7.49, 0.5, 1.15), (7.25, 0.68, 1.61)])
+def test_the_way_out_of_a_niche_is_found(task, control, place):
+    """Put between desks and a stool, with 8 cm to spare round a bend, the robot gets out and touches nothing."""
+    lab = OccupancyGrid.load(Path(__file__).parents[1] / "data" / "lab.yaml")
+    run = perform(task, Unicycle(START), control, background=lab, kidnap=[(28.0, place)])
+    assert run.finished and not run.collisions
