@@ -280,6 +280,7 @@ def log_normal(points, means, covariances):
 
 
 def checked_sequence(sequence, name):
+    """Subgoals as a float array (K, 2), in m; ValueError that calls them `name` if they are none."""
     sequence = np.array(sequence, float)
     if sequence.ndim != 2 or sequence.shape[1] != 2 or not len(sequence):
         raise ValueError(f"{name} must hold at least one subgoal, as (K, 2), got shape {sequence.shape}")

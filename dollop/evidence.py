@@ -56,6 +56,7 @@ class Graph:
 
 
 def chains_of(sequences):
+    """The subgoals of all demonstrations, (K, 2) each in m, as one record, about their common mean."""
     lengths = [len(sequence) for sequence in sequences]
     slices = tuple(slice(end - length, end) for end, length in zip(np.cumsum(lengths).tolist(), lengths, strict=True))
     points = np.concatenate(sequences)
@@ -115,6 +116,7 @@ def graph_of(labels, chains):
 
 
 def sums_by_label(labels, values, size):
+    """Sums (size, d) of the values (M, d) of each label (M,)."""
     return np.stack([np.bincount(labels, column, minlength=size) for column in values.T], axis=-1)
 
 
@@ -124,6 +126,7 @@ def steps_of(chain):
 
 
 def evidence_of(labels, chains, prior):
+    """Evidence in nats of the graph in which subgoal m belongs to node labels[m], (M,)."""
     graph = graph_of(labels, chains)
     table = emission_table(prior, len(labels))
     return float(

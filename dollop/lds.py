@@ -180,4 +180,5 @@ def powers_on(A, x, n):
 
 
 def dot(a, b):
+    """Inner products (...) of vectors (..., d)."""
     return np.einsum("...d,...d->...", a, b)

@@ -71,6 +71,7 @@ def shifted_sums(sums, start, end):
 
 
 def outer(a, b):
+    """Outer products a b^T (..., d, d) of vectors (..., d)."""
     return a[..., :, None] * b[..., None, :]
 
 

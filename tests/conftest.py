@@ -1,6 +1,10 @@
 """What all tests share: the same examples on every machine, however slow, and names without file content."""
 
+import pytest
 from hypothesis import settings
+from walks import walk_figure_eights
+
+from dollop.repetition import laps
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("fresh", deadline=None)  # pytest --hypothesis-profile=fresh: new examples every time
@@ -10,3 +14,15 @@ settings.load_profile("repeatable")
 def pytest_make_parametrize_id(val, argname):
     """Name bytes after their argument: file content holds what changes, such as the time in a gzip's header."""
     return argname if isinstance(val, bytes) else None
+
+
+@pytest.fixture(scope="session")
+def one_lap():
+    """A walked figure-eight of one lap (N, 2)."""
+    return walk_figure_eights(1, seed=0)[1]
+
+
+@pytest.fixture(scope="session")
+def five_laps():
+    """Five laps cut out of one track."""
+    return laps(*walk_figure_eights(6, seed=0))[:5]

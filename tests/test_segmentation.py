@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from walks import walk_figure_eights
 
 from dollop.lds import LDS, Statistics
-from dollop.repetition import laps
 from dollop.segmentation import (
     best_segments,
     candidate_responses,
@@ -21,18 +19,6 @@ from dollop.segmentation import (
 )
 from dollop.sequenced_lds import cut_moments
 from dollop.trajectory import align, distance_to_polyline, resample, retime
-
-
-@pytest.fixture(scope="module")
-def one_lap():
-    """A walked figure-eight of one lap (N, 2)."""
-    return walk_figure_eights(1, seed=0)[1]
-
-
-@pytest.fixture(scope="module")
-def five_laps():
-    """Five laps cut out of one track."""
-    return laps(*walk_figure_eights(6, seed=0))[:5]
 
 
 def search_input(walks, candidates, retimed=True):

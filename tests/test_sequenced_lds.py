@@ -18,18 +18,6 @@ from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory
 
 
 @pytest.fixture(scope="module")
-def one_lap():
-    """A walked figure-eight of one lap (N, 2)."""
-    return walk_figure_eights(1, seed=0)[1]
-
-
-@pytest.fixture(scope="module")
-def five_laps():
-    """Five laps cut out of one track."""
-    return laps(*walk_figure_eights(6, seed=0))[:5]
-
-
-@pytest.fixture(scope="module")
 def law(one_lap):
     """The sequenced LDS of one lap with the default tolerance."""
     return SequencedLDS.fit(one_lap)
