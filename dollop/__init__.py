@@ -28,11 +28,11 @@ from dollop.association import Association, Frames, associate, associate_with_fr
 from dollop.cdhmm import SubgoalHMM
 from dollop.environment import Environment
 from dollop.execution import Run, Unicycle, perform
-from dollop.files import FormatError
+from dollop.formats.files import FormatError
+from dollop.formats.logs import read_log, write_log
 from dollop.gridmap import OccupancyGrid
 from dollop.laser import LaserLog
 from dollop.lds import LDS
-from dollop.logs import read_log, write_log
 from dollop.matching import Matching, match
 from dollop.observation import Observation, observe
 from dollop.repetition import laps

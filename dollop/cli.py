@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 
 from dollop import plot, study
-from dollop.files import check_writable, whole_file
+from dollop.formats.files import check_writable, whole_file
+from dollop.formats.logs import read_log, write_log
 from dollop.gridmap import OccupancyGrid, check_is_map
-from dollop.logs import read_log, write_log
 from dollop.observation import observe
 
 LEG_HEIGHT = "at leg height a walker is two small blobs: try --min-area 0.0025 --stride 0.6"

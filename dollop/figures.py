@@ -17,7 +17,7 @@ from dollop import figures_learning as learning
 from dollop import figures_observing as observing
 from dollop import figures_performing as performing
 from dollop import gallery, plot
-from dollop.files import check_writable, whole_file
+from dollop.formats.files import check_writable, whole_file
 
 FIGURES = {
     "1": observing.figure_1,

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from dollop import carmen, rosmap
-from dollop.carmen import OCCUPIED_FROM
-from dollop.files import FormatError
+from dollop.formats import carmen, ros_map
+from dollop.formats.carmen import OCCUPIED_FROM
+from dollop.formats.files import FormatError
 from dollop.laser import check_positive
 
 MAX_CELLS = 100_000_000
@@ -126,7 +126,7 @@ class OccupancyGrid:
         """
         path = Path(path)
         check_is_map(path)
-        content = carmen.read_map(path) if path.suffix == ".map" else rosmap.read_map(path)
+        content = carmen.read_map(path) if path.suffix == ".map" else ros_map.read_map(path)
         try:
             return cls(*content)
         except ValueError as error:
@@ -144,7 +144,7 @@ class OccupancyGrid:
         """
         path = Path(path)
         check_is_map(path)
-        write_map = carmen.write_map if path.suffix == ".map" else rosmap.write_map
+        write_map = carmen.write_map if path.suffix == ".map" else ros_map.write_map
         write_map(path, self.occupancy, self.origin, self.resolution)
 
     @property

@@ -19,7 +19,7 @@ from scipy import stats
 from tqdm import tqdm
 
 from dollop.claims import CLAIMS
-from dollop.files import FormatError, whole_file
+from dollop.formats.files import FormatError, whole_file
 
 COLUMNS = ["claim", "seed", "number", "value"]
 SEEDS, QUICK_SEEDS = 100, 3

@@ -10,7 +10,7 @@ import numpy as np
 from dollop.association import Association, Frames, associate, associate_with_frames
 from dollop.cdhmm import SubgoalHMM
 from dollop.environment import Environment
-from dollop.files import FormatError, read_bytes, whole_file
+from dollop.formats.files import FormatError, read_bytes, whole_file
 from dollop.lds import LDS, Statistics
 from dollop.matching import Matching, match_confidently
 from dollop.repetition import laps

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from dollop.files import FormatError
+from dollop.formats.files import FormatError
+from dollop.formats.logs import read_log
 from dollop.gridmap import OccupancyGrid
 from dollop.laser import LaserLog
-from dollop.logs import read_log
 
 ROOM = np.array([[-2.02, 3.01], [-1.51, 2.53]])  # xmin, xmax; ymin, ymax
 

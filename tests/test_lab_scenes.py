@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dollop.files import FormatError
+from dollop.formats.files import FormatError
 from dollop.lab import (
     Recording,
     Scene,

@@ -11,7 +11,7 @@ import pytest
 from dollop import study, trials_environment, trials_learning, trials_observing, trials_performing
 from dollop.claims import Claim, Criterion
 from dollop.cli import main
-from dollop.files import FormatError
+from dollop.formats.files import FormatError
 
 
 def claim_of(experiment):

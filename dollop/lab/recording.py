@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from dollop.files import FormatError, whole_file
+from dollop.formats.files import FormatError, whole_file
+from dollop.formats.logs import read_log, write_log
 from dollop.lab.scenes import Scene
 from dollop.laser import LaserLog
-from dollop.logs import read_log, write_log
 
 TRUTH_COLUMNS = ["t", "x", "y", "heading"]
 

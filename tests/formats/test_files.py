@@ -11,8 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dollop import files
-from dollop.files import FormatError, check_writable, forgive, longest_rise, read_bytes, usable_clock, whole_file
+from dollop.formats import files
+from dollop.formats.files import (
+    FormatError,
+    check_writable,
+    forgive,
+    longest_rise,
+    read_bytes,
+    usable_clock,
+    whole_file,
+)
 
 
 def test_error_names_file_and_line():

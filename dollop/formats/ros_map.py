@@ -1,6 +1,8 @@
-"""Maps of ROS map_server: a YAML of flat keys that names a picture (http://wiki.ros.org/map_server).
+"""Maps of ROS map_server: a YAML of flat keys that names a picture
+(http://wiki.ros.org/map_server).
 
-Grey v of the picture, whose first row is the highest y, means the probability (255 - v) / 255, unless `negate`.
+Grey v of the picture, whose first row is the highest y, means the probability (255 - v) / 255,
+unless `negate`.
 """
 
 import os
@@ -9,14 +11,16 @@ import numpy as np
 import yaml
 from PIL import Image
 
-from dollop.carmen import OCCUPIED_FROM
-from dollop.files import FormatError, read_bytes, whole_file
+from dollop.formats.carmen import OCCUPIED_FROM
+from dollop.formats.files import FormatError, read_bytes, whole_file
 
 UNKNOWN_GREY = (127, 128)
 """Written maps have thresholds that make these two greys, and no other, the unknown."""
 
 RIGHT_ANGLED = 1e-6
-"""A turn in rad that counts as none: it moves what is a hundred metres away by a tenth of a millimetre."""
+"""A turn in rad that counts as none: it moves what is a hundred metres away by a tenth of a
+millimetre.
+"""
 
 
 def write_map(path, occupancy, origin, resolution):
@@ -64,8 +68,8 @@ def read_map(path):
     Returns
     -------
     occupancy : (H, W) float array
-        Probabilities, NaN where unknown; row 0 has the lowest y. Occupied and free cells are what the file's thresholds
-        say.
+        Probabilities, NaN where unknown; row 0 has the lowest y. Occupied and free cells are what
+        the file's thresholds say.
     origin : list of two float
         Lower left corner, x, y in m.
     resolution : float
@@ -111,8 +115,11 @@ def number(path, key, value):
 
 
 def read_grey(path, name):
-    """Grey values (H, W) from 0 to 255 of the picture beside a map, of a coloured one the mean as in map_server."""
-    # os.path and not pathlib, which lets names that are too long or hold a zero byte through as other errors.
+    """Grey values (H, W) from 0 to 255 of the picture beside a map, of a coloured one the mean as
+    in map_server.
+    """
+    # os.path and not pathlib, which lets names that are too long or hold a zero byte through as
+    # other errors.
     if not os.path.isfile(path.parent / name):
         raise FormatError(f"its picture {name!r} is missing", path)
     try:
@@ -128,7 +135,9 @@ def read_grey(path, name):
 
 
 def probabilities(path, keys, grey):
-    """Probabilities by the map's `mode`, set so that occupied and free cells are what the file's thresholds say."""
+    """Probabilities by the map's `mode`, set so that occupied and free cells are what the file's
+    thresholds say.
+    """
     mode, negate = keys.get("mode", "trinary"), keys.get("negate", 0)
     if mode not in ("trinary", "scale", "raw"):
         raise FormatError(f"mode must be trinary, scale or raw, got {mode!r}", path)

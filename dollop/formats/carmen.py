@@ -1,7 +1,8 @@
 """CARMEN's own files, the paper's toolkit [6]: laser logs, odometry and occupancy maps.
 
-The formats follow CARMEN's sources (`writelog.c`, `readlog.c`, `laser_messages.h`, `map_io.h` of CARMEN 0.7).
-A log is text, one message per line: name, contents, time of the message in s, host, time since the log began.
+The formats follow CARMEN's sources (`writelog.c`, `readlog.c`, `laser_messages.h`, `map_io.h` of
+CARMEN 0.7). A log is text, one message per line: name, contents, time of the message in s, host,
+time since the log began.
 """
 
 import gzip
@@ -17,22 +18,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dollop.files import FormatError, forgive, longest_rise, read_bytes, usable_clock, whole_file
+from dollop.formats.files import FormatError, forgive, longest_rise, read_bytes, usable_clock, whole_file
 from dollop.laser import LaserLog, check_positive, wrapped
 
 NOMINAL_MAX_RANGE = 80.0
 """What CARMEN takes for the maximum range of a laser in a FLASER line, in m (`readlog.c`)."""
 
 FULL_SCALES = ((8.183, 8.191), (16.375, 16.383), (32.759, 32.767), (51.14, 51.16), (NOMINAL_MAX_RANGE, np.inf))
-"""Readings in m that are a code and no distance: the last nine values of 13, 14 and 15 bits of 1 mm (the error codes
-of the SICK LMS 200), 10 bits of 5 cm, and all from CARMEN's nominal maximum on (13 bits of 1 cm end at 81.91 m)."""
+"""Readings in m that are a code and no distance: the last nine values of 13, 14 and 15 bits of 1 mm
+(the error codes of the SICK LMS 200), 10 bits of 5 cm, and all from CARMEN's nominal maximum on (13
+bits of 1 cm end at 81.91 m)."""
 
 SICK_TYPES, UNKNOWN_TYPE = (0, 1), 99
 """`laser_type` of the SICK LMS and PLS, and of a laser CARMEN has no name for."""
 
 
 class _Beams(NamedTuple):
-    """What must not change within a log: beam count, first bearing and step in rad, stated maximum range, maker."""
+    """What must not change within a log: beam count, first bearing and step in rad, stated maximum
+    range, maker.
+    """
 
     count: int
     start: float
@@ -78,10 +82,11 @@ class Odometry:
 def flaser_angles(count):
     """Bearings of the beams of a FLASER line, which does not state them.
 
-    CARMEN's reader guesses them from their number: 180 or 181 are 1 degree apart, 360 or 361 half a degree, 400 or 401
-    a quarter (100 degrees in all); the even counts lack the last beam; any other number spreads over 180 degrees
-    (`carmen_laser_guess_fov`, `carmen_laser_guess_angle_increment` in `readlog.c`). The first beam is at -90 degrees.
-    In a scan of 100 degrees it is at -50 here, where CARMEN leaves it at -90 too, which no such laser does.
+    CARMEN's reader guesses them from their number: 180 or 181 are 1 degree apart, 360 or 361 half a
+    degree, 400 or 401 a quarter (100 degrees in all); the even counts lack the last beam; any other
+    number spreads over 180 degrees (`carmen_laser_guess_fov`, `carmen_laser_guess_angle_increment`
+    in `readlog.c`). The first beam is at -90 degrees. In a scan of 100 degrees it is at -50 here,
+    where CARMEN leaves it at -90 too, which no such laser does.
 
     Parameters
     ----------
@@ -111,17 +116,19 @@ def _flaser_beams(count):
 def read_log(path, max_range=None):
     """Laser scans of a CARMEN log, plain or gzipped.
 
-    ROBOTLASER1 messages are read where there are any, since they state their own geometry, and FLASER messages
-    otherwise; all other messages are passed over. The pose is the laser's. A reading at or beyond the maximum range, a
-    reading that is an error code of a SICK (`FULL_SCALES`), and a reading of zero become `inf`: nothing came back.
+    ROBOTLASER1 messages are read where there are any, since they state their own geometry, and
+    FLASER messages otherwise; all other messages are passed over. The pose is the laser's. A
+    reading at or beyond the maximum range, a reading that is an error code of a SICK
+    (`FULL_SCALES`), and a reading of zero become `inf`: nothing came back.
 
     Parameters
     ----------
     path : str or Path
         The log.
     max_range : float, optional
-        Range in m from which on a reading means that nothing came back; by default what the message states, or for
-        FLASER, which states nothing, the full scale that the largest reading of the log belongs to.
+        Range in m from which on a reading means that nothing came back; by default what the message
+        states, or for FLASER, which states nothing, the full scale that the largest reading of the
+        log belongs to.
 
     Returns
     -------
@@ -130,15 +137,17 @@ def read_log(path, max_range=None):
     Raises
     ------
     FormatError
-        If the file is no CARMEN log, holds no scan, or more than a few scans are broken (`dollop.files.forgive`).
+        If the file is no CARMEN log, holds no scan, or more than a few scans are broken
+        (`dollop.formats.files.forgive`).
     ValueError
         If `max_range` is not positive and finite.
 
     Warns
     -----
     UserWarning
-        If broken scans were left out, if the clock is wrong (`dollop.files.usable_clock`), or if so many readings of
-        FLASER messages equal the largest one that it may be a full scale that is not known here.
+        If broken scans were left out, if the clock is wrong (`dollop.formats.files.usable_clock`),
+        or if so many readings of FLASER messages equal the largest one that it may be a full scale
+        that is not known here.
     """
     if max_range is not None:
         check_positive("max_range", max_range)
@@ -167,7 +176,9 @@ def _no_return_from(path, ranges, beams):
     share = (ranges == largest).mean()
     if largest < code and ranges.size > 1000 and share > 0.02:
         text = f"{share:.0%} of the readings are exactly {largest} m, the largest; if that means that nothing came back"
-        warnings.warn(f"{path}: {text}, read it with dollop.carmen.read_log(path, max_range={largest})", stacklevel=4)
+        warnings.warn(
+            f"{path}: {text}, read it with dollop.formats.carmen.read_log(path, max_range={largest})", stacklevel=4
+        )
     return code
 
 
@@ -194,7 +205,9 @@ def _parse_scans(path):
 
 
 def _parse_flaser(number, fields):
-    """`FLASER count [ranges] laser_x laser_y laser_theta robot_x robot_y robot_theta time host logger_time`."""
+    """`FLASER count [ranges] laser_x laser_y laser_theta robot_x robot_y robot_theta time host
+    logger_time`.
+    """
     count = _count(fields, 1)
     values = _numbers(fields, 2, count + 7)
     _check_ending(fields, 2 + count + 7)
@@ -202,8 +215,9 @@ def _parse_flaser(number, fields):
 
 
 def _parse_robotlaser(number, fields):
-    """`ROBOTLASER1 type start fov step max_range accuracy remission_mode count [ranges] count [remissions]`, then
-    laser pose (3), robot pose (3), speeds (2), safety distances (2), turn axis, time, host, logger_time."""
+    """`ROBOTLASER1 type start fov step max_range accuracy remission_mode count [ranges] count
+    [remissions]`, then laser pose (3), robot pose (3), speeds (2), safety distances (2), turn axis,
+    time, host, logger_time."""
     kind, start, _, step, limit = _numbers(fields, 1, 5)
     count = _count(fields, 8)
     rest = 10 + count + _count(fields, 9 + count, least=0)
@@ -263,10 +277,11 @@ def _distances(values):
 
 
 def write_log(path, log):
-    """Write scans as a CARMEN log of ROBOTLASER1 messages, which state the laser's geometry; gzipped if named `.gz`.
+    """Write scans as a CARMEN log of ROBOTLASER1 messages, which state the laser's geometry;
+    gzipped if named `.gz`.
 
-    Ranges are written to 1 mm, poses and times to six decimals, as CARMEN does; `inf` becomes the maximum range. The
-    log holds the laser only: its pose stands for the robot's too.
+    Ranges are written to 1 mm, poses and times to six decimals, as CARMEN does; `inf` becomes the
+    maximum range. The log holds the laser only: its pose stands for the robot's too.
 
     Parameters
     ----------
@@ -297,13 +312,17 @@ def write_log(path, log):
 
 
 def _written_ranges(log):
-    """Ranges that keep their meaning when read back: a distance stays in (0, max_range), nothing else reaches it."""
+    """Ranges that keep their meaning when read back: a distance stays in (0, max_range), nothing
+    else reaches it.
+    """
     below = (np.ceil(log.max_range * 1000 - 1e-6) - 1) / 1000
     return np.where(np.isinf(log.ranges), below + 0.001, np.clip(log.ranges, 0.001, below))
 
 
 def _packed(stream, path):
-    """The stream itself, or a gzip stream without name and time, so that the same log gives the same bytes."""
+    """The stream itself, or a gzip stream without name and time, so that the same log gives the
+    same bytes.
+    """
     if str(path).endswith(".gz"):
         return gzip.GzipFile(filename="", fileobj=stream, mode="wb", mtime=0)
     return nullcontext(stream)
@@ -312,7 +331,8 @@ def _packed(stream, path):
 def read_odometry(path):
     """ODOM messages of a CARMEN log, plain or gzipped.
 
-    Messages that the clock puts out of order, as loggers write them now and then, are left out with a warning.
+    Messages that the clock puts out of order, as loggers write them now and then, are left out with
+    a warning.
 
     Parameters
     ----------
@@ -326,8 +346,8 @@ def read_odometry(path):
     Raises
     ------
     FormatError
-        If there is no ODOM message, more than a few are broken, or the clock is in order for less than half of them:
-        odometry without a time cannot be set against anything.
+        If there is no ODOM message, more than a few are broken, or the clock is in order for less
+        than half of them: odometry without a time cannot be set against anything.
     """
     rows, bad = [], []
     for number, line in enumerate(io.BytesIO(read_bytes(path)), 1):
@@ -366,9 +386,10 @@ GRIDMAP_CHUNK, NAMED_CHUNK = 1, 128
 def read_map(path):
     """Occupancy of a CARMEN map file (`CARMENMAPFILE`, version v020), plain or gzipped.
 
-    After comment lines and the label the file is a sequence of chunks: one byte of type, four of size, then ten of
-    description. The gridmap chunk holds two int32 sizes, a float32 resolution and the float32 probabilities, x-major;
-    -1 is unknown. Index times resolution is the world coordinate of a cell's *centre* (`carmen_map_to_world`).
+    After comment lines and the label the file is a sequence of chunks: one byte of type, four of
+    size, then ten of description. The gridmap chunk holds two int32 sizes, a float32 resolution and
+    the float32 probabilities, x-major; -1 is unknown. Index times resolution is the world
+    coordinate of a cell's *centre* (`carmen_map_to_world`).
 
     Parameters
     ----------
@@ -380,7 +401,8 @@ def read_map(path):
     occupancy : (H, W) float array
         Indexed [y, x], NaN where unknown.
     origin : (float, float)
-        Lower left cell's corner, in m: half a cell below zero, unless the map was written by `write_map`.
+        Lower left cell's corner, in m: half a cell below zero, unless the map was written by
+        `write_map`.
     resolution : float
         Metres per cell.
 
@@ -436,8 +458,9 @@ def _map_origin(path, comments, resolution):
 def write_map(path, occupancy, origin, resolution):
     """Write an occupancy grid as a CARMEN map file; see `read_map`.
 
-    CARMEN's map frame begins at the centre of the lower left cell. Where the grid lies otherwise, its place is kept in
-    a comment line of the head, which `read_map` honours and CARMEN passes over.
+    CARMEN's map frame begins at the centre of the lower left cell. Where the grid lies otherwise,
+    its place is kept in a comment line of the head, which `read_map` honours and CARMEN passes
+    over.
 
     Parameters
     ----------

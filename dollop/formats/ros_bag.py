@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dollop.files import FormatError, forgive, usable_clock
+from dollop.formats.files import FormatError, forgive, usable_clock
 from dollop.laser import LaserLog
 
 SCAN_TYPE = "sensor_msgs/msg/LaserScan"
@@ -14,12 +14,14 @@ MOTION_TYPE = "nav_msgs/msg/Odometry"
 
 
 def read_log(path, topic=None):
-    """Laser scans of one topic of a ROS 1 bag (`.bag`), a ROS 2 bag (its folder), or a single `.mcap` or `.db3` file.
+    """Laser scans of one topic of a ROS 1 bag (`.bag`), a ROS 2 bag (its folder), or a single
+    `.mcap` or `.db3` file.
 
-    The poses are all (0, 0, 0): a bag says where the laser is by a tree of transforms, of which only a localisation can
-    make a pose in the world, so the laser is taken to stand still at the origin. If it moved, give the log the poses
-    that your localisation found: `dataclasses.replace(log, poses=poses)`. Ranges outside [range_min, range_max]
-    and NaN become `inf`, as REP 117 (https://www.ros.org/reps/rep-0117.html) has it that they are no measurements.
+    The poses are all (0, 0, 0): a bag says where the laser is by a tree of transforms, of which
+    only a localisation can make a pose in the world, so the laser is taken to stand still at the
+    origin. If it moved, give the log the poses that your localisation found:
+    `dataclasses.replace(log, poses=poses)`. Ranges outside [range_min, range_max] and NaN become
+    `inf`, as REP 117 (https://www.ros.org/reps/rep-0117.html) has it that they are no measurements.
     The time is that of the message's header.
 
     Parameters
@@ -38,13 +40,14 @@ def read_log(path, topic=None):
     ImportError
         If rosbags is not installed.
     FormatError
-        If the file is no bag, holds no such topic or several to choose from, or more than a few scans are broken.
+        If the file is no bag, holds no such topic or several to choose from, or more than a few
+        scans are broken.
 
     Warns
     -----
     UserWarning
-        If broken scans were left out, if the clock is wrong (`dollop.files.usable_clock`), or if the bag holds odometry
-        or moving transforms (`/tf`), so that the robot may have moved.
+        If broken scans were left out, if the clock is wrong (`dollop.formats.files.usable_clock`),
+        or if the bag holds odometry or moving transforms (`/tf`), so that the robot may have moved.
     """
     try:
         from rosbags.highlevel import AnyReader

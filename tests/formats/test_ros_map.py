@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dollop.files import FormatError
+from dollop.formats.files import FormatError
 from dollop.gridmap import OccupancyGrid
 
 MAP_SERVER = """# written by map_server

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dollop import carmen
-from dollop.files import FormatError
+from dollop.formats import carmen
+from dollop.formats.files import FormatError
 from dollop.laser import LaserLog
 
 external = pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA is not set")

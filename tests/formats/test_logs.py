@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dollop.files import FormatError
+from dollop.formats.files import FormatError
+from dollop.formats.logs import read_log, write_log
 from dollop.laser import LaserLog
-from dollop.logs import read_log, write_log
 
 LOG = LaserLog([0.0, 0.1], [[1.0, np.inf], [2.0, 3.0]], [-0.5, 0.5], [[0, 0, 0], [1, 0, 0]], 8.191)
 

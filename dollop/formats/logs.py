@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from dollop import carmen
-from dollop.files import FormatError
+from dollop.formats import carmen
+from dollop.formats.files import FormatError
 
 CARMEN_SUFFIXES = (".log", ".log.gz", ".clf", ".clf.gz")
 ROS_SUFFIXES = (".bag", ".mcap", ".db3")
@@ -15,9 +15,10 @@ def read_log(path, topic=None):
     Parameters
     ----------
     path : str or Path
-        `.log`, `.log.gz`, `.clf`: a CARMEN log (`dollop.carmen.read_log`); `.bag`, `.mcap` or the folder of a ROS 2
-        bag: a ROS bag (`dollop.rosbag.read_log`, which needs the extra `ros`). A bag's poses are all (0, 0, 0): if the
-        sensor moved, give the log its poses in the map with `dataclasses.replace(log, poses=poses)`.
+        `.log`, `.log.gz`, `.clf`: a CARMEN log (`dollop.formats.carmen.read_log`); `.bag`, `.mcap`
+        or the folder of a ROS 2 bag: a ROS bag (`dollop.formats.ros_bag.read_log`, which needs the
+        extra `ros`). A bag's poses are all (0, 0, 0): if the sensor moved, give the log its poses
+        in the map with `dataclasses.replace(log, poses=poses)`.
     topic : str, optional
         Which topic of a ROS bag; needed only if several carry laser scans.
 
@@ -36,9 +37,9 @@ def read_log(path, topic=None):
     if not path.exists():
         raise FileNotFoundError(f"no such file: {path}")
     if path.is_dir() or path.name.endswith(ROS_SUFFIXES):
-        from dollop import rosbag
+        from dollop.formats import ros_bag
 
-        return rosbag.read_log(path, topic)
+        return ros_bag.read_log(path, topic)
     _check_is_carmen(path)
     if topic is not None:
         raise ValueError(f"a CARMEN log has no topics, got topic={topic!r}")

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dollop.files import FormatError
-from dollop.logs import read_log
+from dollop.formats.files import FormatError
+from dollop.formats.logs import read_log
 
 pytest.importorskip("rosbags", reason="the extra ros is not installed")
 

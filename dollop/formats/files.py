@@ -1,4 +1,6 @@
-"""Files at the edge: errors that name file and line, what a reader forgives, writing that is whole or not at all."""
+"""Files at the edge: errors that name file and line, what a reader forgives, writing that is whole
+or not at all.
+"""
 
 import codecs
 import gzip
@@ -14,9 +16,13 @@ import numpy as np
 
 MAX_BYTES = 1 << 30
 NOMINAL_RATE = 10.0
-"""Scans per second of a SICK LMS 200 at 1 degree and 38400 baud: what a log without a usable clock is given."""
+"""Scans per second of a SICK LMS 200 at 1 degree and 38400 baud: what a log without a usable clock
+is given.
+"""
 LONGEST_GAP = 3600.0
-"""Seconds without a scan from which on it is the clock that jumped: no log of a demonstration rests for an hour."""
+"""Seconds without a scan from which on it is the clock that jumped: no log of a demonstration rests
+for an hour.
+"""
 
 
 class FormatError(ValueError):
@@ -39,7 +45,8 @@ class FormatError(ValueError):
 
 
 def read_bytes(path):
-    """Whole content of a file, unpacked where it is gzipped (told by its first two bytes, not by its name).
+    """Whole content of a file, unpacked where it is gzipped (told by its first two bytes, not by
+    its name).
 
     A byte order mark, which some editors put before UTF-8 text, is left out.
 
@@ -55,7 +62,8 @@ def read_bytes(path):
     Raises
     ------
     FormatError
-        If the file is empty, its gzip stream is cut short or damaged, or it holds more than `MAX_BYTES` (1 GiB).
+        If the file is empty, its gzip stream is cut short or damaged, or it holds more than
+        `MAX_BYTES` (1 GiB).
     """
     with open(path, "rb") as stream:
         zipped = stream.read(2) == b"\x1f\x8b"
@@ -84,7 +92,8 @@ def check_writable(path):
 
 @contextmanager
 def whole_file(path, mode="wb"):
-    """Open a temporary neighbour of `path` for writing; it takes the name `path` only when all went well.
+    """Open a temporary neighbour of `path` for writing; it takes the name `path` only when all went
+    well.
 
     Of two such files, one within the other, none takes its name before both are written.
     """
@@ -112,8 +121,9 @@ def _naming(path, error):
 def forgive(path, bad, total):
     """Accept a few broken scans with one warning, or refuse the file.
 
-    A log of at least 20 scans is read without its broken ones as long as they are no more than one in a hundred, or a
-    single one. What is broken in more of them is taken to be the file's nature and not an accident.
+    A log of at least 20 scans is read without its broken ones as long as they are no more than one
+    in a hundred, or a single one. What is broken in more of them is taken to be the file's nature
+    and not an accident.
 
     Parameters
     ----------
@@ -155,7 +165,8 @@ def longest_rise(values):
     >>> longest_rise([0.0, 0.1, 99.0, 0.2, 0.3]).tolist()  # the odd one goes, wherever it points
     [0, 1, 3, 4]
     """
-    # Patience sorting (Fredman 1975): smallest end of a rise of each length, where it stands, and what precedes it.
+    # Patience sorting (Fredman 1975): smallest end of a rise of each length, where it stands, and
+    # what precedes it.
     ends, places, before = [], [], []
     for i, value in enumerate(values):
         k = bisect_left(ends, value)
@@ -170,10 +181,11 @@ def longest_rise(values):
 def usable_clock(path, t):
     """Decide what to do about a clock that stands still, runs backwards or jumps, and warn of it.
 
-    A scan is out of order where the clock runs backwards, and where it is farther than `LONGEST_GAP` from the scan
-    before and the scan after. Where at most one scan in twenty is out of order those are left out. Otherwise the clock
-    is worthless: all scans are kept, in the order of the file, and numbered at `NOMINAL_RATE`; speeds then mean
-    nothing. A jump forwards that lasts is only warned of: either side of it is in order.
+    A scan is out of order where the clock runs backwards, and where it is farther than
+    `LONGEST_GAP` from the scan before and the scan after. Where at most one scan in twenty is out
+    of order those are left out. Otherwise the clock is worthless: all scans are kept, in the order
+    of the file, and numbered at `NOMINAL_RATE`; speeds then mean nothing. A jump forwards that
+    lasts is only warned of: either side of it is in order.
 
     Parameters
     ----------
@@ -205,7 +217,9 @@ def usable_clock(path, t):
 
 
 def _without_strays(t, keep):
-    """`keep` (K,), increasing in `t`, without the few scans that are far from both neighbours; an end has but one."""
+    """`keep` (K,), increasing in `t`, without the few scans that are far from both neighbours; an
+    end has but one.
+    """
     far = np.diff(t[keep], prepend=-np.inf, append=np.inf) > LONGEST_GAP
     stray = far[:-1] & far[1:]
     return keep if stray.sum() * 20 > len(keep) else keep[~stray]
