@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 from benchmarks.timing import row, seconds
 from dollop.environment import Environment
-from dollop.execution import Unicycle, perform
 from dollop.gridmap import OccupancyGrid
 from dollop.lab import figure_eight, figure_eight_scene, record_background
+from dollop.robot.performing import Unicycle, perform
 from dollop.sequenced_lds import SequencedLDS
 
 START = (4.5, 3.5, -0.7)

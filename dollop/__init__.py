@@ -27,15 +27,15 @@ SI units throughout; a pose is (x, y, theta); time comes first in every array.
 from dollop.association import Association, Frames, associate, associate_with_frames
 from dollop.cdhmm import SubgoalHMM
 from dollop.environment import Environment
-from dollop.execution import Run, Unicycle, perform
 from dollop.formats.files import FormatError
 from dollop.formats.logs import read_log, write_log
 from dollop.gridmap import OccupancyGrid
+from dollop.laps import laps
 from dollop.laser import LaserLog
 from dollop.lds import LDS
 from dollop.matching import Matching, match
 from dollop.observation import Observation, observe
-from dollop.repetition import laps
+from dollop.robot.performing import Run, Unicycle, perform
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
 from dollop.tracking import Motion, Track, Tracker

@@ -1,4 +1,4 @@
-"""What merging (`dollop.cdhmm`) is measured against: hidden Markov models of a chosen size, and the plain mean.
+"""What merging (`dollop.cdhmm.model`) is measured against: hidden Markov models of a chosen size, and the plain mean.
 
 Demonstrations of known tasks are drawn with subgoals that scatter and, now and then, one subgoal that is no part of the
 task. Every method gets the same demonstrations and says what it takes for the task: subgoals in order, (L, 2).

@@ -4,12 +4,12 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from dollop.avoidance import ObstacleMap
-from dollop.execution import free_poses, perform
 from dollop.gridmap import OccupancyGrid
+from dollop.laps import laps
 from dollop.matching import match
 from dollop.observation import observe
-from dollop.repetition import laps
+from dollop.robot.avoidance import ObstacleMap
+from dollop.robot.performing import free_poses, perform
 from dollop.task import Demonstration, Task, learn
 
 SEED = 2004

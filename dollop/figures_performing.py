@@ -5,7 +5,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from dollop import experiments, plot
-from dollop.execution import distances_to_law, return_times
+from dollop.robot.performing import distances_to_law, return_times
 from dollop.trajectory import distance_to_polyline, mean_trajectory
 
 SIZE = (6, 5.2)

@@ -11,9 +11,9 @@ from dollop.association import Association, Frames, associate, associate_with_fr
 from dollop.cdhmm import SubgoalHMM
 from dollop.environment import Environment
 from dollop.formats.files import FormatError, read_bytes, whole_file
+from dollop.laps import laps
 from dollop.lds import LDS, Statistics
 from dollop.matching import Matching, match_confidently
-from dollop.repetition import laps
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import check_trajectories
 

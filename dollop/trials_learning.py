@@ -13,8 +13,8 @@ import numpy as np
 from dollop import experiments
 from dollop.baseline import TASKS, draw_demonstrations, merged
 from dollop.cdhmm import SubgoalHMM
-from dollop.execution import Unicycle, perform
 from dollop.lds import LDS
+from dollop.robot.performing import Unicycle, perform
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Task, learn, members_along
 from dollop.trajectory import distance_to_polyline

@@ -11,11 +11,11 @@ from math import inf, nan
 import numpy as np
 
 from dollop import experiments
-from dollop.avoidance import ObstacleMap
-from dollop.control import Guidance
 from dollop.environment import Environment
-from dollop.execution import Unicycle, distances_to_law, free_poses, perform, return_times
 from dollop.lds import LDS
+from dollop.robot.avoidance import ObstacleMap
+from dollop.robot.control import Guidance
+from dollop.robot.performing import Unicycle, distances_to_law, free_poses, perform, return_times
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory, resample
 

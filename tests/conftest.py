@@ -4,7 +4,7 @@ import pytest
 from hypothesis import settings
 from walks import walk_figure_eights
 
-from dollop.repetition import laps
+from dollop.laps import laps
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("fresh", deadline=None)  # pytest --hypothesis-profile=fresh: new examples every time

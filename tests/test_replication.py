@@ -10,8 +10,8 @@ from scipy.stats import binom
 
 from dollop import baseline, experiments, study
 from dollop.claims import CLAIMS
-from dollop.execution import distances_to_law
 from dollop.layouts import matching_shares
+from dollop.robot.performing import distances_to_law
 
 ROOT = Path(__file__).parents[1]
 GOLDEN = json.loads((ROOT / "study" / "golden.json").read_text())

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from walks import any_walks, moving, walk_figure_eights
 
+from dollop.laps import laps
 from dollop.lds import LDS
-from dollop.repetition import laps
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dollop.control import wrap
 from dollop.lab.world import PHYSICS_RATE, pybullet
+from dollop.robot.control import wrap
 
 URDF = Path(__file__).with_name("pioneer2dx.urdf")
 WHEEL_RADIUS = 0.0825

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from dollop.control import PIONEER_LIMITS, Limits
 from dollop.lab.pioneer import LASER_OFFSET, Pioneer, laser_pose
 from dollop.lab.sick import SickLMS200
-from dollop.localization import MonteCarloLocalizer, motion_between
+from dollop.robot.control import PIONEER_LIMITS, Limits
+from dollop.robot.localization import MonteCarloLocalizer, motion_between
 
 
 class LocalisedPioneer:

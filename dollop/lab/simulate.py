@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 
-from dollop.control import wrap
 from dollop.lab import person
 from dollop.lab.pioneer import Pioneer, laser_pose
 from dollop.lab.recording import TRUTH_COLUMNS, Recording
@@ -11,6 +10,7 @@ from dollop.lab.scenes import empty_scene, figure_eight_scene
 from dollop.lab.sick import SickLMS200
 from dollop.lab.world import World
 from dollop.laser import LaserLog
+from dollop.robot.control import wrap
 
 TOUR = (
     (4.5, 2.6),

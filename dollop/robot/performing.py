@@ -1,9 +1,9 @@
 """Performing a task: robots, kidnapping, and what comes of it (Sec. III; Fig. 7, 10 and 12).
 
-A robot is anything with `pose` (x, y in m, theta in rad: what it believes), `localised` (whether it trusts its belief),
-`limits`, `period` in s, and `drive(v, omega)`, which lets one period pass. One that can feel what it touches has
-`touching`; a simulated one has `true_pose`, for measuring, and `place(pose)`, which kidnaps it. Here is a fast one for
-studies; `dollop.lab.robot` has the Pioneer.
+A robot is anything with `pose` (x, y in m, theta in rad: what it believes), `localised` (whether it
+trusts its belief), `limits`, `period` in s, and `drive(v, omega)`, which lets one period pass. One
+that can feel what it touches has `touching`; a simulated one has `true_pose`, for measuring, and
+`place(pose)`, which kidnaps it. Here is a fast one for studies; `dollop.lab.robot` has the Pioneer.
 """
 
 from dataclasses import dataclass
@@ -11,16 +11,16 @@ from math import cos, isfinite, sin
 
 import numpy as np
 
-from dollop.avoidance import Geodesic, ObstacleMap
-from dollop.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits, clip, wrap
+from dollop.robot.avoidance import Geodesic, ObstacleMap
+from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits, clip, wrap
 from dollop.trajectory import distance_to_polyline
 
 SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
-"""A robot that does not know where it is turns on the spot, rad/s, and moves off what it touches, m/s: back, and if
-that has not helped within so many s, forth."""
+"""A robot that does not know where it is turns on the spot, rad/s, and moves off what it touches,
+m/s: back, and if that has not helped within so many s, forth."""
 HELD = 1.0
-"""Time in s for which a robot goes on to move off what it touched; and for which one that was kidnapped must keep near
-the response to count as back on it."""
+"""Time in s for which a robot goes on to move off what it touched; and for which one that was
+kidnapped must keep near the response to count as back on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +40,15 @@ class Run:
     localised : (N,) bool array
         Whether the robot trusted its pose.
     clearance : (N,) float array
-        Distance in m between the edge of the robot, taken as a disc, and the nearest obstacle on its map.
+        Distance in m between the edge of the robot, taken as a disc, and the nearest obstacle on
+        its map.
     finished : bool
         Whether every segment handed over.
     reason : str
         Why not; empty when finished.
     collisions : int
-        How often the robot came to touch something: felt by a robot that can, else clearance falling below zero.
+        How often the robot came to touch something: felt by a robot that can, else clearance
+        falling below zero.
     kidnapped : (M,) float array
         Times in s.
     """
@@ -64,7 +66,8 @@ class Run:
 
 
 class Unicycle:
-    """A kinematic robot with the Pioneer's limits that knows its pose; it passes through what it hits.
+    """A kinematic robot with the Pioneer's limits that knows its pose; it passes through what it
+    hits.
 
     Parameters
     ----------
@@ -96,7 +99,9 @@ class Unicycle:
         self.speed = self.turn = 0.0
 
     def drive(self, speed, turn):
-        """Move for one period towards a speed in m/s and a turning rate in rad/s, within the limits."""
+        """Move for one period towards a speed in m/s and a turning rate in rad/s, within the
+        limits.
+        """
         limits, period = self.limits, self.period
         self.speed = approach(self.speed, clip(speed, limits.speed), limits.acceleration * period)
         self.turn = approach(self.turn, clip(turn, limits.turn), limits.turn_acceleration * period)
@@ -128,8 +133,8 @@ def perform(
     task : Task
         Anything with a `law` (SequencedLDS) and an `environment` (Environment).
     robot : Unicycle, LocalisedPioneer, or one of your own
-        See the top of `dollop.execution`. Where it stands is where it starts. It drives until the task is finished or
-        given up.
+        See the top of `dollop.robot.performing`. Where it stands is where it starts. It drives
+        until the task is finished or given up.
     control : str
         "plain" or "pursuit", the better one.
     avoid : bool
@@ -141,8 +146,8 @@ def perform(
     timeout : float
         Give up after this time in s.
     localise_within : float
-        Give up when the robot has not known where it is for this time in s. Until it knows, it turns on the spot, and
-        moves off what it touches.
+        Give up when the robot has not known where it is for this time in s. Until it knows, it
+        turns on the spot, and moves off what it touches.
 
     Returns
     -------
@@ -151,8 +156,8 @@ def perform(
     Raises
     ------
     ValueError
-        For an unknown control law, a start, subgoal or kidnapping that is not finite, off the map or in an obstacle, a
-        time-out that is not positive, or a kidnapping before the start.
+        For an unknown control law, a start, subgoal or kidnapping that is not finite, off the map
+        or in an obstacle, a time-out that is not positive, or a kidnapping before the start.
     """
     if control not in CONTROL_LAWS:
         raise ValueError(f"control must be one of {sorted(CONTROL_LAWS)}, got {control!r}")
@@ -170,7 +175,9 @@ def perform(
 
 
 class Search:
-    """What a robot does that does not know where it is: turn on the spot, and first move off what it touches."""
+    """What a robot does that does not know where it is: turn on the spot, and first move off what
+    it touches.
+    """
 
     def __init__(self, period):
         self.period, self.speed, self.pushed, self.off = period, -BACK_OFF, 0.0, HELD
@@ -190,7 +197,9 @@ class Search:
 
 
 def drive(supervisor, robot, kidnap, timeout, localise_within):
-    """The control loop: a record (pose, true pose, segment, localised, touching) per period, and why it gave up."""
+    """The control loop: a record (pose, true pose, segment, localised, touching) per period, and
+    why it gave up.
+    """
     records, blind, search = [], 0.0, Search(robot.period)
     while True:
         now = len(records) * robot.period
@@ -295,13 +304,16 @@ def free_poses(count, obstacles, goal, seed, room=0.05):
 
 
 def distances_to_law(run, law):
-    """Distance in m of every true pose of a run to the law's response from where the run started: (N,)."""
+    """Distance in m of every true pose of a run to the law's response from where the run started:
+    (N,).
+    """
     positions = run.true_poses[:, :2]
     return distance_to_polyline(positions, law.response(positions[0]))
 
 
 def return_times(run, law, within=0.10):
-    """Time in s from each kidnapping until the robot is back on the response from its start, and keeps to it.
+    """Time in s from each kidnapping until the robot is back on the response from its start, and
+    keeps to it.
 
     Parameters
     ----------

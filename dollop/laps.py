@@ -1,6 +1,7 @@
 """The laps of a trajectory that repeats itself, such as the five figure-eights of Fig. 6.
 
-The paper shows one control law for five laps, and does not say how they were cut: this is a reconstruction.
+The paper shows one control law for five laps, and does not say how they were cut: this is a
+reconstruction.
 """
 
 import numpy as np
@@ -18,8 +19,9 @@ STRAIGHT = 0.5  # a gate needs a direction: distance made good, as a share of th
 def lap_lag(track):
     """After how many samples a track repeats itself, 0 if it does not.
 
-    The median distance between places that lie a lag apart along the track drops when the lag is one lap. The crossing
-    of a figure-eight does not make it drop: half a lap later hardly any other place is met again.
+    The median distance between places that lie a lag apart along the track drops when the lag is
+    one lap. The crossing of a figure-eight does not make it drop: half a lap later hardly any other
+    place is met again.
 
     Parameters
     ----------
@@ -42,7 +44,9 @@ def lap_lag(track):
 
 
 def distance_to_next_lap(track, lag):
-    """Distance in m of each place on a track (n, d) to the nearest about lag samples later; as many as there are."""
+    """Distance in m of each place on a track (n, d) to the nearest about lag samples later; as many
+    as there are.
+    """
     slack = int(LAP_SPREAD * lag)
     here = track[: len(track) - lag - slack]
     later = (track[lag + shift :][: len(here)] for shift in range(-slack, slack + 1))
@@ -57,11 +61,12 @@ def first_run(beside, run):
 def laps(t, positions):
     """Cut the laps out of one continuously walked track.
 
-    The length of a lap comes from where the track repeats itself (`lap_lag`). Ways to and from the laps, which run
-    beside no other lap, are dropped. The gate is a line across the track; a lap begins where the track crosses it in
-    the gate's direction, about one lap after the last time, so that the second visit to a figure-eight's crossing opens
-    no lap. Of all gates on the first lap the one with the most laps is taken, and among those the one that is passed
-    most narrowly. What is left at head and tail is dropped.
+    The length of a lap comes from where the track repeats itself (`lap_lag`). Ways to and from the
+    laps, which run beside no other lap, are dropped. The gate is a line across the track; a lap
+    begins where the track crosses it in the gate's direction, about one lap after the last time, so
+    that the second visit to a figure-eight's crossing opens no lap. Of all gates on the first lap
+    the one with the most laps is taken, and among those the one that is passed most narrowly. What
+    is left at head and tail is dropped.
 
     Parameters
     ----------
@@ -73,7 +78,8 @@ def laps(t, positions):
     Returns
     -------
     list of (N_k, 2) float arrays
-        The laps in order, all sampled at the track's median period; the whole track if it does not repeat itself.
+        The laps in order, all sampled at the track's median period; the whole track if it does not
+        repeat itself.
 
     Raises
     ------
@@ -97,7 +103,9 @@ def laps(t, positions):
 
 
 def lap_cuts(points):
-    """Samples of a track (N, 2) at which the laps begin, and the one at which the last ends; see `laps`."""
+    """Samples of a track (N, 2) at which the laps begin, and the one at which the last ends; see
+    `laps`.
+    """
     walked, n = arc_length(points), min(max(len(points), 100), 1000)
     track, step = resample(points, n), walked[-1] / (n - 1)
     lag = lap_lag(track)
@@ -112,7 +120,9 @@ def lap_cuts(points):
 
 
 def best_cuts(points, lap, width):
-    """The gate crossings of the gate with the most laps, among those of the one that is passed most narrowly."""
+    """The gate crossings of the gate with the most laps, among those of the one that is passed most
+    narrowly.
+    """
     walked, end = arc_length(points), len(points) - 1
     best, best_rank = [0, end], (2, -np.inf)
     for gate in np.flatnonzero(walked < lap):

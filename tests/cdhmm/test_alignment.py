@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_t
 
-from dollop.evidence import (
+from dollop.cdhmm.alignment import align_chain, compact, estimate_structure, mean_place, path_through
+from dollop.cdhmm.evidence import (
     END,
     FIRST,
     START,
@@ -21,8 +22,7 @@ from dollop.evidence import (
     prior_over,
     transition_evidence,
 )
-from dollop.merging import Merging, merge_states, reachability, topological_order
-from dollop.structure import align_chain, compact, estimate_structure, mean_place, path_through
+from dollop.cdhmm.merging import Merging, merge_states, reachability, topological_order
 
 
 def prepared(sequences, spread=0.15):

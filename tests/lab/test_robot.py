@@ -10,11 +10,11 @@ pytest.importorskip("pybullet", reason="the laboratory needs PyBullet")
 from rooms import figure_eight
 
 from dollop.environment import Environment
-from dollop.execution import perform
 from dollop.gridmap import OccupancyGrid
 from dollop.lab.robot import LocalisedPioneer
 from dollop.lab.scenes import BACKGROUND, BEAM_HEIGHT, ROOM, figure_eight_scene
 from dollop.lab.world import World
+from dollop.robot.performing import perform
 from dollop.sequenced_lds import SequencedLDS
 
 START = (4.5, 3.6, -0.7)

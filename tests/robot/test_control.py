@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rooms import figure_eight_task
 
-from dollop.avoidance import ObstacleMap
-from dollop.control import CONTROL_LAWS, PIONEER_LIMITS, REACH, STEP, Guidance, Limits, bend_speeds, clip, wrap
 from dollop.environment import Environment
-from dollop.execution import Unicycle
 from dollop.gridmap import OccupancyGrid
 from dollop.lds import LDS, Statistics
+from dollop.robot.avoidance import ObstacleMap
+from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, REACH, STEP, Guidance, Limits, bend_speeds, clip, wrap
+from dollop.robot.performing import Unicycle
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import distance_to_polyline
 

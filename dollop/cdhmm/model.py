@@ -1,10 +1,13 @@
-"""Sec. V: a Continuous-Density Hidden Markov Model (CDHMM) of the user, its structure estimated from subgoals.
+"""Sec. V: a Continuous-Density Hidden Markov Model (CDHMM) of the user, its structure estimated
+from subgoals.
 
-The user is a CDHMM that emits subgoals. Every demonstration enters as a chain of states of its own, START -> .. -> END;
-states are merged best-first while the evidence of the whole grows, never when one is reachable from the other, so that
-the graph stays acyclic. The paper names its merge test only by reference; this one is a reconstruction after Bayesian
-model merging (Stolcke & Omohundro, NIPS 1992) and acyclic probabilistic automata (Ron, Singer & Tishby, JCSS 1998).
-`dollop.evidence` has the formulas, `dollop.merging` and `dollop.structure` the search.
+The user is a CDHMM that emits subgoals. Every demonstration enters as a chain of states of its own,
+START -> .. -> END; states are merged best-first while the evidence of the whole grows, never when
+one is reachable from the other, so that the graph stays acyclic. The paper names its merge test
+only by reference; this one is a reconstruction after Bayesian model merging (Stolcke & Omohundro,
+NIPS 1992) and acyclic probabilistic automata (Ron, Singer & Tishby, JCSS 1998).
+`dollop.cdhmm.evidence` has the formulas, `dollop.cdhmm.merging` and `dollop.cdhmm.alignment` the
+search.
 """
 
 from dataclasses import dataclass
@@ -15,18 +18,7 @@ from operator import add
 import numpy as np
 from scipy.special import logsumexp
 
-from dollop.evidence import (
-    END,
-    FIRST,
-    START,
-    chains_of,
-    emission_table,
-    evidence_of,
-    graph_of,
-    outer_products,
-    prior_over,
-)
-from dollop.structure import (
+from dollop.cdhmm.alignment import (
     LEAST_COVERAGE,
     align_chain,
     coverage_of,
@@ -37,6 +29,17 @@ from dollop.structure import (
     path_through,
     set_apart,
 )
+from dollop.cdhmm.evidence import (
+    END,
+    FIRST,
+    START,
+    chains_of,
+    emission_table,
+    evidence_of,
+    graph_of,
+    outer_products,
+    prior_over,
+)
 
 LEAST_SPREAD, MOST_SPREAD = 1e-6, 1e6  # m: beyond, the evidence drowns in rounding
 FARTHEST = 1e9  # m: so far from the origin a place may lie
@@ -44,7 +47,8 @@ FARTHEST = 1e9  # m: so far from the origin a place may lie
 
 @dataclass(frozen=True, eq=False)
 class SubgoalHMM:
-    """What several demonstrations have in common: a CDHMM over subgoals, acyclic, its structure estimated (Sec. V).
+    """What several demonstrations have in common: a CDHMM over subgoals, acyclic, its structure
+    estimated (Sec. V).
 
     States are numbered so that every edge leads from a lower to a higher one.
 
@@ -53,7 +57,8 @@ class SubgoalHMM:
     means : (S, 2) float array
         The subgoal each state stands for, in m: the mean of the subgoals merged into it.
     covariances : (S, 2, 2) float array
-        How the subgoal of a state spreads, in m^2: the posterior mean, well defined from one subgoal on.
+        How the subgoal of a state spreads, in m^2: the posterior mean, well defined from one
+        subgoal on.
     transitions : (S, S) float array
         Probability of going from a state to another. Each row and its entry of `end` sum to one.
     start, end : (S,) float arrays
@@ -63,9 +68,11 @@ class SubgoalHMM:
     states : tuple of (K,) int arrays
         The state of each of these subgoals. A demonstration visits no state twice.
     spread : float
-        How far one subgoal is expected to lie from its mean along each axis, standard deviation in m.
+        How far one subgoal is expected to lie from its mean along each axis, standard deviation in
+        m.
     evidence : float
-        Logarithm of the probability of all subgoals and of their order, in nats, with the parameters integrated out.
+        Logarithm of the probability of all subgoals and of their order, in nats, with the
+        parameters integrated out.
 
     Examples
     --------
@@ -94,10 +101,12 @@ class SubgoalHMM:
         Parameters
         ----------
         sequences : sequence of (K, 2) array_like
-            The subgoals of each demonstration in order, in m, all in one environment. Lengths may differ.
+            The subgoals of each demonstration in order, in m, all in one environment. Lengths may
+            differ.
         spread : float
-            How far one subgoal is expected to lie from its mean along each axis, standard deviation in m. Two single
-            subgoals are merged up to about four times this apart, less or more by what their neighbours say.
+            How far one subgoal is expected to lie from its mean along each axis, standard deviation
+            in m. Two single subgoals are merged up to about four times this apart, less or more by
+            what their neighbours say.
 
         Returns
         -------
@@ -106,7 +115,8 @@ class SubgoalHMM:
         Raises
         ------
         ValueError
-            No demonstration, one that is empty, not (K, 2) or not finite, or a spread that is not positive.
+            No demonstration, one that is empty, not (K, 2) or not finite, or a spread that is not
+            positive.
         """
         sequences = tuple(checked_sequence(sequence, f"demonstration {k}") for k, sequence in enumerate(sequences))
         if not sequences:
@@ -138,24 +148,29 @@ class SubgoalHMM:
         )
 
     def add(self, sequence):
-        """The model of all demonstrations so far and one more, (K, 2) in m: the same as fitting all of them at once."""
+        """The model of all demonstrations so far and one more, (K, 2) in m: the same as fitting all
+        of them at once.
+        """
         return SubgoalHMM.fit([*self.sequences, sequence], self.spread)
 
     def most_likely_path(self):
         """States of the most probable way from start to end, in order (L,): the task (Sec. V).
 
-        Among equally probable ways the one of fewer states, then the one whose states hold more subgoals, then the one
-        that was demonstrated earlier.
+        Among equally probable ways the one of fewer states, then the one whose states hold more
+        subgoals, then the one that was demonstrated earlier.
         """
         chains, graph, _ = self._grown()
         return path_through(graph, earliest(np.concatenate(self.states) + FIRST, chains)) - FIRST
 
     def coverage(self):
-        """The share of the states on the most-likely path that each demonstration visits, (demonstrations,)."""
+        """The share of the states on the most-likely path that each demonstration visits,
+        (demonstrations,).
+        """
         return coverage_of(self.states, self.most_likely_path())
 
     def outliers(self):
-        """Demonstrations that do something else: they visit fewer than half of the states of the most-likely path.
+        """Demonstrations that do something else: they visit fewer than half of the states of the
+        most-likely path.
 
         Returns
         -------
@@ -170,8 +185,8 @@ class SubgoalHMM:
         Returns
         -------
         dict
-            (from state, to state) to a list of (demonstration, segment). Segment i of a demonstration ends in its
-            subgoal i; the first comes from the start, -1.
+            (from state, to state) to a list of (demonstration, segment). Segment i of a
+            demonstration ends in its subgoal i; the first comes from the start, -1.
         """
         edges = {}
         for demonstration, states in enumerate(self.states):
@@ -180,17 +195,20 @@ class SubgoalHMM:
         return edges
 
     def pooled(self, statistics):
-        """Add up along each edge what segments have in common, so that one LDS describes all that were merged (Sec. V).
+        """Add up along each edge what segments have in common, so that one LDS describes all that
+        were merged (Sec. V).
 
         Parameters
         ----------
         statistics : sequence of sequences
-            `statistics[demonstration][segment]`, anything additive, for instance `dollop.lds.Statistics`.
+            `statistics[demonstration][segment]`, anything additive, for instance
+            `dollop.lds.Statistics`.
 
         Returns
         -------
         dict
-            (from state, to state) to the sum over the segments along that edge; from -1 is from the start.
+            (from state, to state) to the sum over the segments along that edge; from -1 is from the
+            start.
 
         Raises
         ------
@@ -206,7 +224,8 @@ class SubgoalHMM:
         }
 
     def states_of(self, sequence):
-        """The states of another demonstration's subgoals, those that raise the evidence most (Viterbi).
+        """The states of another demonstration's subgoals, those that raise the evidence most
+        (Viterbi).
 
         Parameters
         ----------
@@ -216,8 +235,9 @@ class SubgoalHMM:
         Returns
         -------
         (K,) int array
-            -1 for a subgoal that is better explained by a state of its own. Steps that no demonstration has taken are
-            possible, at the price of a new edge; only the order of the states is kept.
+            -1 for a subgoal that is better explained by a state of its own. Steps that no
+            demonstration has taken are possible, at the price of a new edge; only the order of the
+            states is kept.
 
         Raises
         ------
@@ -233,7 +253,8 @@ class SubgoalHMM:
         return np.where(nodes < 0, -1, nodes - FIRST)
 
     def log_likelihood(self, sequence):
-        """Logarithm of the probability density that the model emits these subgoals, summed over all its paths.
+        """Logarithm of the probability density that the model emits these subgoals, summed over all
+        its paths.
 
         Parameters
         ----------
@@ -265,7 +286,9 @@ class SubgoalHMM:
 
 
 def parameters_of(graph, prior):
-    """Mean of the subgoals of each state (S, 2), and the posterior mean of its covariance (S, 2, 2)."""
+    """Mean of the subgoals of each state (S, 2), and the posterior mean of its covariance (S, 2,
+    2).
+    """
     n, s, q = graph.n[FIRST:, None], graph.s[FIRST:], graph.q[FIRST:]
     scatter = q - outer_products(s) / (prior.kappa + n) + prior.psi * np.array([1, 0, 1])
     covariances = scatter / (prior.nu + n - 3)

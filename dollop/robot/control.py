@@ -4,14 +4,15 @@ In segment k the law maps the current state to a direction, whatever brought the
 
     u(p) = (A_k - I)(p - g_k) / |(A_k - I)(p - g_k)|.
 
-A segment stays in force until the robot has come to its subgoal g_k; then the next one takes over. So a robot that is
-kidnapped keeps its segment: it goes on to the subgoal it was heading for, as the user would have done from there. Two
-control laws make v and omega of it:
+A segment stays in force until the robot has come to its subgoal g_k; then the next one takes over.
+So a robot that is kidnapped keeps its segment: it goes on to the subgoal it was heading for, as the
+user would have done from there. Two control laws make v and omega of it:
 
-- `Plain` turns towards u and drives at the demonstrated speed; it knows nothing of what the robot can do. A segment
-  hands over within 0.25 m of its subgoal.
-- `Pursuit` rolls the response out from the current state and pursues a point ahead on it, slower where it bends. A
-  segment hands over where the place on the response that is nearest to the robot belongs to the next.
+- `Plain` turns towards u and drives at the demonstrated speed; it knows nothing of what the robot
+  can do. A segment hands over within 0.25 m of its subgoal.
+- `Pursuit` rolls the response out from the current state and pursues a point ahead on it, slower
+  where it bends. A segment hands over where the place on the response that is nearest to the robot
+  belongs to the next.
 
 The paper gives neither the rule of handing over nor a controller: both are reconstructions.
 """
@@ -22,12 +23,16 @@ from math import atan2, cos, hypot, pi, sin
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from dollop.avoidance import Geodesic
+from dollop.robot.avoidance import Geodesic
 
 REACH = 0.25
-"""How near to its subgoal a segment hands over, in m: a robot that needs 0.6 m to turn would circle nearer ones."""
+"""How near to its subgoal a segment hands over, in m: a robot that needs 0.6 m to turn would circle
+nearer ones.
+"""
 PATIENCE = 8.0
-"""Time in s without progress after which the way is changed or the speed halved; turning round takes half of it."""
+"""Time in s without progress after which the way is changed or the speed halved; turning round
+takes half of it.
+"""
 STEP = 0.05
 """Distance in m between the places of a response that is pursued."""
 LOOK_AHEAD = 7
@@ -43,15 +48,18 @@ LEAST_SPEED = 0.1
 SHARP = 1.2
 """Angle in rad from which a robot turns first and drives then."""
 TURN_GAIN = 3.0
-"""Turning rate in rad/s per rad of heading error: the error fades within a third of a second, about as fast as the
-robot's turning acceleration allows. On a bend the heading lags by turning rate / gain, and that is most of the plain
-law's distance: over twelve laws 78 mm on average with 2, 45 mm with 3."""
+"""Turning rate in rad/s per rad of heading error: the error fades within a third of a second, about
+as fast as the robot's turning acceleration allows. On a bend the heading lags by turning rate /
+gain, and that is most of the plain law's distance: over twelve laws 78 mm on average with 2, 45 mm
+with 3."""
 SLOWEST = 1 / 16
 """Share of the demonstrated speed below which a robot that makes no progress gives up."""
 
 Limits = namedtuple("Limits", "speed turn acceleration turn_acceleration")
 PIONEER_LIMITS = Limits(0.5, 0.8, 0.5, 1.57)
-"""Speed in m/s, turning rate in rad/s (CARMEN, p2d8+), accelerations in m/s^2 and rad/s^2 (Stage, pioneer.inc)."""
+"""Speed in m/s, turning rate in rad/s (CARMEN, p2d8+), accelerations in m/s^2 and rad/s^2 (Stage,
+pioneer.inc).
+"""
 
 
 def clip(value, limit):
@@ -75,8 +83,8 @@ class Guidance:
     Attributes
     ----------
     detours : dict
-        For a segment whose response does not get through: the `Geodesic` to its subgoal that is followed instead, or,
-        without obstacles, None for the straight line.
+        For a segment whose response does not get through: the `Geodesic` to its subgoal that is
+        followed instead, or, without obstacles, None for the straight line.
     """
 
     def __init__(self, law, obstacles=None):
@@ -115,9 +123,11 @@ class Guidance:
         self.detours[k] = self.geodesics.get(k)
 
     def remaining(self, k, x, y):
-        """What falls on the way to subgoal k: the length of a detour, else the Lyapunov measure |x|_P of the offset.
+        """What falls on the way to subgoal k: the length of a detour, else the Lyapunov measure
+        |x|_P of the offset.
 
-        P solves A^T P A - P = -I. Along u the measure falls, for x^T P x is convex and falls from x to A x.
+        P solves A^T P A - P = -I. Along u the measure falls, for x^T P x is convex and falls from x
+        to A x.
         """
         if self.detours.get(k):
             return self.detours[k].distance(x, y)
@@ -126,7 +136,9 @@ class Guidance:
         return (p * x * x + 2 * q * x * y + r * y * y) ** 0.5
 
     def reached(self, k, x, y, reach):
-        """Whether x, y in m is within reach of subgoal k, or of the place nearest to it where the robot has room."""
+        """Whether x, y in m is within reach of subgoal k, or of the place nearest to it where the
+        robot has room.
+        """
         gx, gy = self.goals[k]
         if hypot(x - gx, y - gy) < reach:
             return True
@@ -136,7 +148,9 @@ class Guidance:
         return hypot(x - gx, y - gy) < reach
 
     def leg(self, k, x, y):
-        """The response of segment k rolled out from x, y in m: a list of places 5 cm apart, and whether it arrived."""
+        """The response of segment k rolled out from x, y in m: a list of places 5 cm apart, and
+        whether it arrived.
+        """
         places, ahead = [], (x, y)
         for _ in range(round(FARTHEST / STEP)):
             if self.reached(k, x, y, STEP):
@@ -151,7 +165,9 @@ class Guidance:
         return places, False
 
     def state_ahead(self, k, state, x, y):
-        """The first state of segment k from `state` on that is 5 cm from x, y in m, or comes to the subgoal."""
+        """The first state of segment k from `state` on that is 5 cm from x, y in m, or comes to the
+        subgoal.
+        """
         (gx, gy), (a, b, c, d) = self.goals[k], self.steps[k]
         while distance(state, x, y) < STEP <= distance(state, gx, gy):
             offset_x, offset_y = state[0] - gx, state[1] - gy
@@ -161,7 +177,8 @@ class Guidance:
     def way(self, k, x, y):
         """Legs of all segments from k on, from x, y in m: places and the segment each belongs to.
 
-        A leg that does not arrive is replaced by a detour; where that does not arrive either, the way ends.
+        A leg that does not arrive is replaced by a detour; where that does not arrive either, the
+        way ends.
         """
         places, segments = [(x, y)], [k]
         for segment in range(k, len(self.goals)):
@@ -188,8 +205,9 @@ class Supervisor:
     done : bool
         Whether the last one has handed over.
     pace : float
-        Share of the demonstrated speed. It is halved when there is no progress: the slower a robot, the more exactly it
-        can follow the direction of the law, whose Lyapunov measure falls everywhere, and so every segment hands over.
+        Share of the demonstrated speed. It is halved when there is no progress: the slower a robot,
+        the more exactly it can follow the direction of the law, whose Lyapunov measure falls
+        everywhere, and so every segment hands over.
     """
 
     def __init__(self, guidance, speeds, robot):
@@ -200,7 +218,9 @@ class Supervisor:
         self.restart()
 
     def restart(self):
-        """Begin the segment in force: at its full pace, without a detour, with all the time in the world."""
+        """Begin the segment in force: at its full pace, without a detour, with all the time in the
+        world.
+        """
         self.pace, self.best, self.waited = 1.0, float("inf"), 0.0
         self.guidance.detours.pop(self.active, None)
 
@@ -219,7 +239,9 @@ class Supervisor:
             self.insist()
 
     def insist(self):
-        """Take a detour; if there is one already, halve the pace; if that is very low already, give up."""
+        """Take a detour; if there is one already, halve the pace; if that is very low already, give
+        up.
+        """
         self.best, self.waited = float("inf"), 0.0
         if self.guidance.obstacles and self.active not in self.guidance.detours:
             self.guidance.detour(self.active)
@@ -242,7 +264,9 @@ class Supervisor:
 
 
 class Plain(Supervisor):
-    """Turn towards the law's direction, drive at the demonstrated speed: v = s max(0, cos e), omega = 3 e."""
+    """Turn towards the law's direction, drive at the demonstrated speed: v = s max(0, cos e), omega
+    = 3 e.
+    """
 
     def command(self, x, y, theta):
         """v in m/s and omega in rad/s for a pose."""
@@ -262,15 +286,17 @@ class Plain(Supervisor):
 class Pursuit(Supervisor):
     """Pursue a point 0.35 m ahead on the response, no faster than the robot can turn there.
 
-    The circle through robot and point has the curvature 2 sin(e) / distance (Coulter, "Implementation of the pure
-    pursuit path tracking algorithm", CMU-RI-TR-92-01).
+    The circle through robot and point has the curvature 2 sin(e) / distance (Coulter,
+    "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-92-01).
     """
 
     places = ((float("inf"), float("inf")),)  # no response yet: any pose is astray
     at = 0
 
     def plan(self, x, y):
-        """Roll the response out from x, y in m; beyond its end it goes straight on, for something to pursue."""
+        """Roll the response out from x, y in m; beyond its end it goes straight on, for something
+        to pursue.
+        """
         self.places, self.segments = self.guidance.way(self.active, x, y)
         self.at, self.end = 0, len(self.places) - 1
         ux, uy = self.guidance.direction(len(self.speeds) - 1, *self.places[max(self.end - 1, 0)])
@@ -296,7 +322,9 @@ class Pursuit(Supervisor):
         return speed, curvature * speed
 
     def pursued(self, x, y):
-        """The place 0.35 m ahead on the response, or a nearer one where going straight there would cut a corner."""
+        """The place 0.35 m ahead on the response, or a nearer one where going straight there would
+        cut a corner.
+        """
         obstacles = self.guidance.obstacles
         for place in self.places[self.at + LOOK_AHEAD : self.at + 1 : -1]:
             if not obstacles or not obstacles.cuts_corner(x, y, *place):
@@ -309,10 +337,11 @@ class Pursuit(Supervisor):
         self.places, self.at = Pursuit.places, 0
 
     def advance(self, x, y):
-        """Move on along the response to the nearest place in the look-ahead, handing over where its segments do.
+        """Move on along the response to the nearest place in the look-ahead, handing over where its
+        segments do.
 
-        The whole look-ahead counts: before a sharp turn at a subgoal the next place may be farther off, and those after
-        the turn nearer.
+        The whole look-ahead counts: before a sharp turn at a subgoal the next place may be farther
+        off, and those after the turn nearer.
         """
         window = range(min(self.at + LOOK_AHEAD, self.end), self.at - 1, -1)
         self.at = min(window, key=lambda i: distance(self.places[i], x, y))
@@ -334,9 +363,11 @@ def distance(place, x, y):
 
 
 def bend_speeds(places, speeds, limits):
-    """Speed in m/s at which to pass each of (N, 2) places: as demonstrated, but such that bends can be turned.
+    """Speed in m/s at which to pass each of (N, 2) places: as demonstrated, but such that bends can
+    be turned.
 
-    A fifth of the turning rate stays in hand for corrections. Before a bend the speed falls no faster than it can.
+    A fifth of the turning rate stays in hand for corrections. Before a bend the speed falls no
+    faster than it can.
     """
     steps = np.diff(places, axis=0)
     headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))

@@ -1,4 +1,5 @@
-"""Best-first merging of states while the evidence grows (Sec. V), never where one is reachable from the other.
+"""Best-first merging of states while the evidence grows (Sec. V), never where one is reachable from
+the other.
 
 The gain of every pair stands in a matrix, of which a merge renews only the rows that it touches.
 """
@@ -8,14 +9,15 @@ import heapq
 import numpy as np
 from scipy.special import gammaln
 
-from dollop.evidence import FIRST, LEAST_GAIN, emission_evidence, emission_table, graph_of
+from dollop.cdhmm.evidence import FIRST, LEAST_GAIN, emission_evidence, emission_table, graph_of
 
 
 class Merging:
     """The gain of evidence of every pair of nodes, kept up to date while pairs are merged.
 
-    A merge changes few pairs: those of the merged node, those of two of its predecessors or two of its successors, and
-    those of a node that led to both. Only these are computed again. The gain of merging a and b is made of
+    A merge changes few pairs: those of the merged node, those of two of its predecessors or two of
+    its successors, and those of a node that led to both. Only these are computed again. The gain of
+    merging a and b is made of
 
         emissions  ev(a + b) - ev(a) - ev(b)
         leaving    D(K_ab, C_ab) - D(K_a, C_a) - D(K_b, C_b) + sum over v of f(c_av, c_bv),   K_ab = K_a + K_b - common
@@ -103,7 +105,9 @@ class Merging:
         self.labels[self.labels == self.names[v]] = self.names[u]
 
     def _block(self, u, v):
-        """What reaches u or v now reaches all that either reaches: those pairs can never merge again."""
+        """What reaches u or v now reaches all that either reaches: those pairs can never merge
+        again.
+        """
         above, below = self.reaches[:, u] | self.reaches[:, v], self.reaches[u] | self.reaches[v]
         rows, columns = above.nonzero()[0], below.nonzero()[0]
         self.reaches[rows[:, None], columns] = True
@@ -149,7 +153,9 @@ class Merging:
         return together - self.alone[rows, None] - self.alone[columns] + self.leaving[block]
 
     def _count_entries(self, node, sign):
-        """Add (or take away) what the edges into a node contribute to the pairs of its predecessors."""
+        """Add (or take away) what the edges into a node contribute to the pairs of its
+        predecessors.
+        """
         before = self.counts[:, node].nonzero()[0]
         if len(before) > 1:
             block, c = (before[:, None], before), self.counts[before, node]
@@ -157,7 +163,9 @@ class Merging:
             self.leaving[block] += sign * self._ways(c[:, None], c)
 
     def _count_exits(self, node, sign):
-        """Add (or take away) what the edges out of a node contribute to the pairs of its successors."""
+        """Add (or take away) what the edges out of a node contribute to the pairs of its
+        successors.
+        """
         after = self.counts[node].nonzero()[0]
         if len(after) > 1:
             c = self.counts[node, after]
@@ -198,7 +206,9 @@ def reachability(counts):
 
 
 def topological_order(counts, place):
-    """Nodes so that every edge leads onward; where the graph leaves it open, by place (S,), then by number."""
+    """Nodes so that every edge leads onward; where the graph leaves it open, by place (S,), then by
+    number.
+    """
     successors = [[] for _ in counts]
     waiting, place = [0] * len(counts), place.tolist()
     for node, successor in zip(*(ends.tolist() for ends in np.nonzero(counts)), strict=True):

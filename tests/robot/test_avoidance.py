@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dollop.avoidance import INFLUENCE, KEPT, Geodesic, ObstacleMap
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
+from dollop.robot.avoidance import INFLUENCE, KEPT, Geodesic, ObstacleMap
 
 BOX = ObstacleMap.of(Environment([[-0.5, -0.5, 0.5, 0.5]]))
 angles = st.floats(-np.pi, np.pi)

@@ -1,8 +1,9 @@
 """The structure of a CDHMM (Sec. V): merging, and two moves that put right what merging errs in.
 
-Best-first merging alone can err early, where a path crosses itself or an odd subgoal comes near a later one, and what
-it merged then keeps other pairs apart. So two moves follow, kept only if the evidence grows: all demonstrations are
-taken out and aligned with the growing graph one after another, and each is aligned afresh with what the others built.
+Best-first merging alone can err early, where a path crosses itself or an odd subgoal comes near a
+later one, and what it merged then keeps other pairs apart. So two moves follow, kept only if the
+evidence grows: all demonstrations are taken out and aligned with the growing graph one after
+another, and each is aligned afresh with what the others built.
 """
 
 from collections import deque
@@ -10,7 +11,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from dollop.evidence import (
+from dollop.cdhmm.evidence import (
     END,
     FIRST,
     LEAST_GAIN,
@@ -24,13 +25,15 @@ from dollop.evidence import (
     steps_of,
     transition_evidence,
 )
-from dollop.merging import merge_states, topological_order
+from dollop.cdhmm.merging import merge_states, topological_order
 
 LEAST_COVERAGE = 0.5  # of the states on the most-likely path: who visits fewer does something else
 
 
 def graph_without(graph, chain, points):
-    """The graph as it is without one demonstration, whose states are `chain` (L,) and subgoals `points` (L, 2)."""
+    """The graph as it is without one demonstration, whose states are `chain` (L,) and subgoals
+    `points` (L, 2).
+    """
     n, s, q, counts = graph.n.copy(), graph.s.copy(), graph.q.copy(), graph.counts.copy()
     n[chain] -= 1  # a demonstration visits no state twice
     s[chain] -= points
@@ -48,18 +51,22 @@ def emission_gains(graph, points, prior, table):
 
 
 def edge_gains(counts):
-    """What one more step adds to the evidence: along each edge u -> v (S, S), and along a new edge from u (S,)."""
+    """What one more step adds to the evidence: along each edge u -> v (S, S), and along a new edge
+    from u (S,).
+    """
     out, total = np.maximum((counts > 0).sum(1), 1), counts.sum(1)
     new = np.where(total > 0, np.log(out) - np.log(out + total) - np.log(out + total + 1), 0.0)
     return np.where(counts > 0, np.log(counts + 1) - np.log(out + total)[:, None], new[:, None]), new
 
 
 def align_chain(points, place, graph, prior, table):
-    """The states of a new demonstration that raise the evidence most: nodes (L,), -1 for a state of its own; the gain.
+    """The states of a new demonstration that raise the evidence most: nodes (L,), -1 for a state of
+    its own; the gain.
 
-    Exact over all alignments that follow one topological order of the graph (so that it stays acyclic), because a
-    demonstration visits a state at most once: each step of it adds its own term. With M_i(v) the best gain when
-    subgoal i went to node v, and N_i(u) when it has a state of its own and u was the last node shared,
+    Exact over all alignments that follow one topological order of the graph (so that it stays
+    acyclic), because a demonstration visits a state at most once: each step of it adds its own
+    term. With M_i(v) the best gain when subgoal i went to node v, and N_i(u) when it has a state of
+    its own and u was the last node shared,
 
         M_i(v) = emission_i(v) + max over u before v of { M_{i-1}(u) + edge(u, v),  N_{i-1}(u) }
         N_i(u) = emission_i(own) + max { M_{i-1}(u) + new edge(u),  N_{i-1}(u) }
@@ -75,7 +82,9 @@ def align_chain(points, place, graph, prior, table):
 
 
 def best_alignment(shared, own, into, new):
-    """The recursion of `align_chain` over nodes in topological order, START first; edges `into` v from u (S, S)."""
+    """The recursion of `align_chain` over nodes in topological order, START first; edges `into` v
+    from u (S, S).
+    """
     nodes, steps = np.arange(len(new)), []
     matched, apart = np.where(nodes == 0, 0.0, -np.inf), np.full(len(new), -np.inf)
     for i in range(len(own) + 1):
@@ -90,7 +99,9 @@ def best_alignment(shared, own, into, new):
 
 
 def best_before(values):
-    """For each place, where among those before it the highest value is (the first place gets itself)."""
+    """For each place, where among those before it the highest value is (the first place gets
+    itself).
+    """
     highest = np.where(values == np.maximum.accumulate(values), np.arange(len(values)), 0)
     return np.concatenate([[0], np.maximum.accumulate(highest)[:-1]])
 
@@ -141,7 +152,9 @@ def compact(labels):
 
 
 def worst_explained_first(labels, chains, graph, prior, table):
-    """Demonstrations in the order of what each adds to the evidence, per subgoal: an order that hangs on content."""
+    """Demonstrations in the order of what each adds to the evidence, per subgoal: an order that
+    hangs on content.
+    """
     shares = []
     for part in chains.slices:
         rest = graph_without(graph, labels[part], chains.points[part])
@@ -163,7 +176,9 @@ def realign(labels, chains, prior):
 
 
 def rebuild(labels, chains, prior):
-    """Take every demonstration out, and align them again one after another, the best explained first."""
+    """Take every demonstration out, and align them again one after another, the best explained
+    first.
+    """
     table = emission_table(prior, len(labels) + 1)
     order = worst_explained_first(labels, chains, graph_of(labels, chains), prior, table)[::-1]
     rebuilt = np.full(len(labels), START)
@@ -176,7 +191,9 @@ def rebuild(labels, chains, prior):
 
 
 def improve(labels, chains, prior):
-    """Labels (M,) that neither aligning one demonstration afresh nor merging two states can improve."""
+    """Labels (M,) that neither aligning one demonstration afresh nor merging two states can
+    improve.
+    """
     improved = None
     while not np.array_equal(labels, improved):
         improved = compact(realign(compact(labels), chains, prior))
@@ -185,7 +202,9 @@ def improve(labels, chains, prior):
 
 
 def estimate_structure(chains, prior):
-    """Labels (M,) by best-first merging, built anew from what that has taught as often as it helps, and improved."""
+    """Labels (M,) by best-first merging, built anew from what that has taught as often as it helps,
+    and improved.
+    """
     labels = compact(merge_states(np.arange(len(chains.points)) + FIRST, chains, prior))
     while True:
         rebuilt = improve(rebuild(labels, chains, prior), chains, prior)
@@ -196,9 +215,11 @@ def estimate_structure(chains, prior):
 
 
 def set_apart(labels, chains):
-    """Give demonstrations that do something else states of their own, so that they draw nobody's subgoals aside.
+    """Give demonstrations that do something else states of their own, so that they draw nobody's
+    subgoals aside.
 
-    They may share those with each other. Taking them out can change the most-likely path, hence the repetition.
+    They may share those with each other. Taking them out can change the most-likely path, hence the
+    repetition.
     """
     owner = np.repeat(np.arange(len(chains.slices)), [part.stop - part.start for part in chains.slices])
     apart = np.zeros(len(chains.slices), bool)
@@ -218,7 +239,9 @@ def coverage_of(chains, path):
 
 
 def numbered(labels, chains):
-    """Labels numbered so that every edge leads from a lower to a higher state; where that leaves it open, by place."""
+    """Labels numbered so that every edge leads from a lower to a higher state; where that leaves it
+    open, by place.
+    """
     order = topological_order(graph_of(labels, chains).counts, mean_place(labels, chains, labels.max() + 1))
     states = [node for node in order if node >= FIRST]
     rank = np.zeros(labels.max() + 1, int)
@@ -237,9 +260,10 @@ def earliest(labels, chains):
 def path_through(graph, first):
     """The nodes between START and END on the most probable way through.
 
-    Probabilities are multiplied as exact fractions, so that a tie is a tie. (What the states emit stays out: a density
-    has units, and would reward or punish long paths by the choice of metres.) Ties go to the way of fewer states, then
-    to that with more subgoals in them, then to that of the demonstration given earlier, `first` (S,) per node.
+    Probabilities are multiplied as exact fractions, so that a tie is a tie. (What the states emit
+    stays out: a density has units, and would reward or punish long paths by the choice of metres.)
+    Ties go to the way of fewer states, then to that with more subgoals in them, then to that of the
+    demonstration given earlier, `first` (S,) per node.
     """
     totals, reach = graph.counts.sum(1), {START: (Fraction(1), 0, 0, 0)}
     came = {}

@@ -6,7 +6,7 @@ from rooms import ANGLES, CANS, FURNITURE, WALLS, drawn_map, room_map, scan
 
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
-from dollop.localization import (
+from dollop.robot.localization import (
     BELIEVED_AFTER,
     FLOOR,
     SEARCHING,

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from walks import walk_figure_eights
 
-from dollop.repetition import laps
+from dollop.laps import laps
 from dollop.trajectory import arc_length
 
 

@@ -1,14 +1,16 @@
-"""Obstacle-aware modulation of a control law: round what the robot knows of, and unchanged where nothing is near.
+"""Obstacle-aware modulation of a control law: round what the robot knows of, and unchanged where
+nothing is near.
 
-The direction u of the law is turned along the surface of what is near (Khansari-Zadeh and Billard, "A dynamical system
-approach to realtime obstacle avoidance", Autonomous Robots 32, 2012): with n the unit normal away from the obstacle
-and t the tangent,
+The direction u of the law is turned along the surface of what is near (Khansari-Zadeh and Billard,
+"A dynamical system approach to realtime obstacle avoidance", Autonomous Robots 32, 2012): with n
+the unit normal away from the obstacle and t the tangent,
 
     u' = (1 - 1/Gamma) (n.u) n + (1 + 1/Gamma) (t.u) t     where n.u < 0,    u' = u elsewhere.
 
-Gamma is 1 at the distance that is kept and grows to infinity where the influence ends; below the kept distance the
-factor of n is negative and the robot is led out. The normal comes from the distance field of the map, so that desks and
-walls need no shape of their own. In a concave corner this comes to a halt; the way out is then a `Geodesic`.
+Gamma is 1 at the distance that is kept and grows to infinity where the influence ends; below the
+kept distance the factor of n is negative and the robot is led out. The normal comes from the
+distance field of the map, so that desks and walls need no shape of their own. In a concave corner
+this comes to a halt; the way out is then a `Geodesic`.
 """
 
 from dataclasses import dataclass, field
@@ -23,11 +25,15 @@ from scipy.sparse.csgraph import dijkstra
 ROBOT_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
 KEPT, INFLUENCE = 0.20, 0.50
-"""Distance in m between the robot's edge and an obstacle that the modulation keeps, and at which it sets in."""
+"""Distance in m between the robot's edge and an obstacle that the modulation keeps, and at which it
+sets in.
+"""
 TIGHT = KEPT / 3
 """Distance in m between the robot's edge and an obstacle that the shortest ways keep."""
 FREE_BELOW = 0.2
-"""Occupancy below which a cell is trusted to be free: a stool's thin column is missed by most beams in its cell."""
+"""Occupancy below which a cell is trusted to be free: a stool's thin column is missed by most beams
+in its cell.
+"""
 CROWDING = 4.0
 """How many times longer a metre counts for the geodesic where the robot would touch something."""
 OPEN_BORDER = 3.0
@@ -77,7 +83,8 @@ class ObstacleMap:
         environment : Environment
             Its boxes are obstacles.
         background : OccupancyGrid, optional
-            All that is not free is an obstacle, and so is all around the map. Without it the world is open.
+            All that is not free is an obstacle, and so is all around the map. Without it the world
+            is open.
         places : (N, 2) array_like, optional
             Without a background: places in m that the map must hold as well.
         radius : float
@@ -96,11 +103,15 @@ class ObstacleMap:
         return cls(signed_distance(blocked, resolution), origin, resolution, radius)
 
     def edge(self, x, y):
-        """Distance in m between the edge of a robot at x, y in m and the nearest obstacle, negative in contact."""
+        """Distance in m between the edge of a robot at x, y in m and the nearest obstacle, negative
+        in contact.
+        """
         return self.edge_and_slope(x, y)[0]
 
     def edge_and_slope(self, x, y):
-        """`edge`, and how much it grows per m along x and along y; bilinear between the cells' centres."""
+        """`edge`, and how much it grows per m along x and along y; bilinear between the cells'
+        centres.
+        """
         rows, columns = self.distances.shape
         across = min(max((x - self.origin[0]) / self.resolution - 0.5, 0.0), columns - 1.001)
         up = min(max((y - self.origin[1]) / self.resolution - 0.5, 0.0), rows - 1.001)
@@ -113,7 +124,9 @@ class ObstacleMap:
         return lower + top * (upper - lower) - self.radius, slope_x, (upper - lower) / self.resolution
 
     def cuts_corner(self, x, y, ahead_x, ahead_y):
-        """Whether half-way on the straight line from x, y to another place, in m, the robot has next to no room."""
+        """Whether half-way on the straight line from x, y to another place, in m, the robot has
+        next to no room.
+        """
         return self.edge((x + ahead_x) / 2, (y + ahead_y) / 2) <= TIGHT
 
     def edges(self, positions):
@@ -128,7 +141,9 @@ class ObstacleMap:
         return 0 <= x - self.origin[0] < columns * side and 0 <= y - self.origin[1] < rows * side
 
     def modulate(self, x, y, ux, uy):
-        """The direction (ux, uy) of a law at x, y in m, turned along what is near; unchanged where nothing is."""
+        """The direction (ux, uy) of a law at x, y in m, turned along what is near; unchanged where
+        nothing is.
+        """
         edge, nx, ny = self.edge_and_slope(x, y)
         towards = nx * ux + ny * uy
         length = nx * nx + ny * ny
@@ -143,7 +158,8 @@ class ObstacleMap:
         return (turned_x / size, turned_y / size) if size > 1e-9 else (ux, uy)
 
     def speed_limit(self, x, y, theta, deceleration, period):
-        """Speed in m/s from which a robot still stops before it touches, whatever the direction of what is near.
+        """Speed in m/s from which a robot still stops before it touches, whatever the direction of
+        what is near.
 
         One that has next to no room left may only creep, and only outwards.
         """
@@ -196,7 +212,8 @@ class ObstacleMap:
 
 
 class Geodesic:
-    """Shortest ways on an ObstacleMap to one place, or to the nearest place to it where the robot has room.
+    """Shortest ways on an ObstacleMap to one place, or to the nearest place to it where the robot
+    has room.
 
     Parameters
     ----------
@@ -215,7 +232,9 @@ class Geodesic:
         self.distances, self.before = distances.tolist(), before.tolist()
 
     def distance(self, x, y):
-        """Length of the way from x, y in m, counted longer where it is narrow; `inf` where there is none."""
+        """Length of the way from x, y in m, counted longer where it is narrow; `inf` where there is
+        none.
+        """
         return self.distances[self.obstacles.cell(x, y)]
 
     def direction(self, x, y):
@@ -267,7 +286,9 @@ def covered_cells(boxes, origin, resolution, shape):
 
 
 def signed_distance(blocked, resolution):
-    """From the centre of each cell to the edge of what is blocked, in m, negative inside; far where nothing is."""
+    """From the centre of each cell to the edge of what is blocked, in m, negative inside; far where
+    nothing is.
+    """
     if not blocked.any():
         return np.full(blocked.shape, 1e3)
     outside = ndimage.distance_transform_edt(~blocked)

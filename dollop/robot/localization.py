@@ -1,18 +1,21 @@
-"""Monte Carlo localisation: where the robot is, from odometry and laser on the background map (CARMEN's part).
+"""Monte Carlo localisation: where the robot is, from odometry and laser on the background map
+(CARMEN's part).
 
-Particles move by the odometry and its error, and are weighed by a likelihood field: a beam that ends at distance d from
-the nearest thing on the map has
+Particles move by the odometry and its error, and are weighed by a likelihood field: a beam that
+ends at distance d from the nearest thing on the map has
 
     q(d) = exp(-d^2 / (2 sigma^2)),    likelihood = floor + (1 - floor) q(d),
 
-so that whatever is not on the map costs no more than the floor: a person, a trash can, a mixed pixel.
+so that whatever is not on the map costs no more than the floor: a person, a trash can, a mixed
+pixel.
 
-A kidnapping is noticed by the fit of a scan, the mean q of its beams at the pose: it falls below its long average, as
-in augmented Monte Carlo localisation (Thrun, Burgard and Fox, "Probabilistic Robotics", 2005, sec. 8.3.5). The
-particles are then drawn anew from the scan itself (Lenser and Veloso, "Sensor resetting localization for poorly
-modelled mobile robots", ICRA 2000): every pose of a lattice over the free cells is weighed. A room may look alike from
-two sides to a laser that sees half of it, so a pose that was searched for is believed only when it has explained every
-scan of half a turn.
+A kidnapping is noticed by the fit of a scan, the mean q of its beams at the pose: it falls below
+its long average, as in augmented Monte Carlo localisation (Thrun, Burgard and Fox, "Probabilistic
+Robotics", 2005, sec. 8.3.5). The particles are then drawn anew from the scan itself (Lenser and
+Veloso, "Sensor resetting localization for poorly modelled mobile robots", ICRA 2000): every pose of
+a lattice over the free cells is weighed. A room may look alike from two sides to a laser that sees
+half of it, so a pose that was searched for is believed only when it has explained every scan of
+half a turn.
 """
 
 from math import pi
@@ -20,10 +23,12 @@ from math import pi
 import numpy as np
 from scipy import ndimage
 
-from dollop.avoidance import FREE_BELOW, covered_cells
+from dollop.robot.avoidance import FREE_BELOW, covered_cells
 
 SIGMA, WIDE_SIGMA = 0.10, 0.20
-"""Standard deviation in m of the likelihood field: for particles, and for a lattice, which misses the true pose."""
+"""Standard deviation in m of the likelihood field: for particles, and for a lattice, which misses
+the true pose.
+"""
 FLOOR = 0.10
 """Likelihood of a beam that the map does not explain."""
 INDEPENDENT = 0.3
@@ -37,7 +42,9 @@ TRACKING, SEARCHING = 250, 3000
 NARROW = (0.15, 0.15)
 """Standard deviations in m and rad below which particles agree."""
 BELIEVED_AFTER, GIVEN_UP_AFTER = pi, 2 * pi
-"""Angles in rad to turn until a pose that explains every scan is believed, and until the search starts anew."""
+"""Angles in rad to turn until a pose that explains every scan is believed, and until the search
+starts anew.
+"""
 LOST = 0.65
 """Share of its long average below which the fit of a scan is in doubt."""
 DOUBTS = 3
@@ -144,7 +151,9 @@ class MonteCarloLocalizer:
         self.judge(abs(motion[2]))
 
     def judge(self, turn):
-        """Doubt a pose that was believed, or believe one that was searched for, after a turn of so many rad."""
+        """Doubt a pose that was believed, or believe one that was searched for, after a turn of so
+        many rad.
+        """
         fits = self.fit >= LOST * self.usual_fit
         if self.converged:
             self.doubts = 0 if fits else self.doubts + 1
@@ -171,7 +180,9 @@ class MonteCarloLocalizer:
         return ranges[back, None] * directions + [self.laser_offset, 0.0]
 
     def draw(self, ends):
-        """Particles (N, 3) drawn from the scan: lattice poses by their likelihood, spread over their meshes."""
+        """Particles (N, 3) drawn from the scan: lattice poses by their likelihood, spread over
+        their meshes.
+        """
         headings = np.arange(HEADINGS) * (2 * pi / HEADINGS)
         scores = [self.wide_field.lattice_log_likelihoods(self.lattice, heading, ends[::2]) for heading in headings]
         chances = softmax(2 * INDEPENDENT * np.concatenate(scores))
@@ -221,7 +232,9 @@ class LikelihoodField:
         return self.log_table[self.cells(poses, ends)].sum(axis=1)
 
     def lattice_log_likelihoods(self, places, heading, ends):
-        """The same for places (N, 2) that share a heading in rad; beams are moved by whole cells, which is faster."""
+        """The same for places (N, 2) that share a heading in rad; beams are moved by whole cells,
+        which is faster.
+        """
         here = self.cells(np.column_stack([places, np.zeros(len(places))]), np.zeros((1, 2)))
         there = np.rint(self.within_reach(ends) @ turn_matrix(heading).T / self.resolution).astype(np.int32)
         return self.log_table[here + (there[:, 1] * self.columns + there[:, 0])].sum(axis=1)
@@ -251,8 +264,8 @@ def lattice(free, background):
 def moved_particles(particles, motion, rng):
     """Particles (N, 3) after a motion (3,) by odometry, each with an error of its own.
 
-    Standard deviations: 10 % of the way and 2 mm along it, 5 % and 2 mm across; 10 % of the turn, 3 degrees per m
-    and 0.1 degrees.
+    Standard deviations: 10 % of the way and 2 mm along it, 5 % and 2 mm across; 10 % of the turn, 3
+    degrees per m and 0.1 degrees.
     """
     ahead, left, turn = motion
     way = np.hypot(ahead, left)
@@ -267,7 +280,8 @@ def moved_particles(particles, motion, rng):
 
 
 def motion_between(before, after):
-    """What happened between two poses (3,) of the odometry: m ahead and to the left, seen from half the turn, and rad.
+    """What happened between two poses (3,) of the odometry: m ahead and to the left, seen from half
+    the turn, and rad.
 
     Examples
     --------

@@ -1,4 +1,5 @@
-"""The evidence for a CDHMM's structure (Sec. V): Normal-inverse-Wishart emissions, Dirichlet transitions.
+"""The evidence for a CDHMM's structure (Sec. V): Normal-inverse-Wishart emissions, Dirichlet
+transitions.
 
 ====================  ==========================================================================================
 n, s, q               of a state: the number of its subgoals, their sum, and the sum of their xx, xy, yy, all taken
@@ -7,7 +8,8 @@ kappa, nu, psi        the Normal-inverse-Wishart prior of a state: mean ~ N(0, S
 c_uv, C_u, K_u        how often the edge u -> v was taken, their sum over v, and the number of edges that leave u
 ====================  ==========================================================================================
 
-The structure is one number per subgoal, its state; everything else follows from these *labels*. Their evidence is
+The structure is one number per subgoal, its state; everything else follows from these *labels*.
+Their evidence is
 
     sum over states of   log p(subgoals of the state)                                      (Normal-inverse-Wishart)
   + sum over nodes of    log G(K_u) - log G(K_u + C_u) + sum over v of log G(c_uv + 1)     (Dirichlet, beta = 1)
@@ -26,8 +28,8 @@ LEAST_GAIN = 1e-9  # nats: a smaller gain of evidence is rounding, not a reason
 class Chains:
     """The subgoals of all demonstrations, one after the other.
 
-    `points` (M, 2) from their mean, `slices` where each demonstration lies, `first` (M,) where one begins, `place` (M,)
-    position in the demonstration, in (0, 1).
+    `points` (M, 2) from their mean, `slices` where each demonstration lies, `first` (M,) where one
+    begins, `place` (M,) position in the demonstration, in (0, 1).
     """
 
     points: np.ndarray
@@ -65,7 +67,9 @@ def chains_of(sequences):
 
 
 def prior_over(points, spread):
-    """Expect states of covariance spread^2, their means as wide apart as the subgoals are, no less than the spread."""
+    """Expect states of covariance spread^2, their means as wide apart as the subgoals are, no less
+    than the spread.
+    """
     nu, width = 8.0, max(np.sqrt(np.mean(points**2)), spread)
     return Prior(kappa=(spread / width) ** 2, nu=nu, psi=(nu - 3) * spread**2)
 
