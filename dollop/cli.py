@@ -8,11 +8,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from dollop import plot, study
+from dollop import plot
 from dollop.formats.files import check_writable, whole_file
 from dollop.formats.logs import read_log, write_log
 from dollop.gridmap import OccupancyGrid, check_is_map
 from dollop.observation import observe
+from dollop.replication import study
 
 LEG_HEIGHT = "at leg height a walker is two small blobs: try --min-area 0.0025 --stride 0.6"
 
@@ -100,19 +101,19 @@ def outputs(options):
 
 def record_data(options):
     """dollop data"""
-    from dollop import experiments
+    from dollop.replication import recordings
 
     options.folder.mkdir(parents=True, exist_ok=True)
     check_writable(options.folder / "lab.yaml")
-    write_log(options.folder / "empty_lab.log.gz", experiments.empty_lab())
-    experiments.background_map().save(options.folder / "lab.yaml")
-    recordings = {"figure_eights": experiments.figure_eights()}
-    recordings |= {f"slalom_{k}": experiments.slalom_recording(k) for k in (0, 1)}
-    recordings |= {f"moved_cans_{k}": experiments.moved_cans(k) for k in range(len(experiments.LAYOUTS))}
-    recordings["moved_cones"] = experiments.moved_cones()
-    for name, recording in recordings.items():
+    write_log(options.folder / "empty_lab.log.gz", recordings.empty_lab())
+    recordings.background_map().save(options.folder / "lab.yaml")
+    scenes = {"figure_eights": recordings.figure_eights()}
+    scenes |= {f"slalom_{k}": recordings.slalom_recording(k) for k in (0, 1)}
+    scenes |= {f"moved_cans_{k}": recordings.moved_cans(k) for k in range(len(recordings.LAYOUTS))}
+    scenes["moved_cones"] = recordings.moved_cones()
+    for name, recording in scenes.items():
         recording.save(options.folder / f"{name}.log.gz")
-    print(f"wrote empty_lab, lab, {', '.join(recordings)} into {options.folder}/")
+    print(f"wrote empty_lab, lab, {', '.join(scenes)} into {options.folder}/")
 
 
 if __name__ == "__main__":

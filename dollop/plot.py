@@ -1,8 +1,9 @@
-"""The drawing vocabulary: one colour per meaning, the plane in metres, used by figures and notebooks alike.
+"""The drawing vocabulary: one colour per meaning, the plane in metres, used by figures and
+notebooks alike.
 
-What is in the room has colours of Okabe and Ito's palette, what is compared in graphs has those of Tol's: colour-blind
-readers can tell them apart. Red boxes, green law and yellow robot are also the paper's. Black is for what is neutral:
-subgoals, corners, readings, writing.
+What is in the room has colours of Okabe and Ito's palette, what is compared in graphs has those of
+Tol's: colour-blind readers can tell them apart. Red boxes, green law and yellow robot are also the
+paper's. Black is for what is neutral: subgoals, corners, readings, writing.
 """
 
 import io
@@ -36,14 +37,18 @@ METHODS = {
     "HMM, BIC": "#661100",  # browns: the two hidden Markov models
     "left-to-right HMM, BIC": "#BF8B5E",
 }
-"""Colours of the methods that are compared, by their names in `dollop.match` and `dollop.baseline`."""
+"""Colours of the methods that are compared, by their names in `dollop.match` and
+`dollop.replication.baseline`.
+"""
 
 RUN_SHADES = ("#CC79A7", "#7A3B62", "#E3A9C8", "#A6437C", "#4F2340")
 RUN_LINES = ("-", (0, (7, 1.5)), (0, (5, 1.2, 1, 1.2)), (0, (3, 1)), (0, (9, 1.5, 1, 1.5, 1, 1.5)))
 """Shades of RUN and dashes by which a few runs are told apart."""
 
 HEADS_AT = 0.18, 0.65
-"""Where along a law its arrowheads are, as shares of its length: away from the crossing of a figure-eight."""
+"""Where along a law its arrowheads are, as shares of its length: away from the crossing of a
+figure-eight.
+"""
 
 HALO = withStroke(linewidth=2.5, foreground="white")
 """Keeps writing legible where it lies over lines."""
@@ -108,7 +113,9 @@ def path(ax, positions, label=None, colour=USER, **kwargs):
 
 
 def law(ax, response, label="control law", **kwargs):
-    """The response (N, 2) of a control law, and on its way two arrowheads that say which way it is walked."""
+    """The response (N, 2) of a control law, and on its way two arrowheads that say which way it is
+    walked.
+    """
     response = np.asarray(response)
     kwargs = {"linewidth": 2, "colour": LAW} | kwargs
     path(ax, response, label, **kwargs)
@@ -139,7 +146,9 @@ def scan(ax, log, i, label="laser scan"):
 
 
 def workspace(grid, pose=None, obstacles=(), ax=None, title=None):
-    """Axes for the plane with the background map, and where given the watching robot and the obstacles' boxes."""
+    """Axes for the plane with the background map, and where given the watching robot and the
+    obstacles' boxes.
+    """
     ax = plane(ax, title)
     grid_map(ax, grid)
     boxes(ax, obstacles, "obstacles")
@@ -177,8 +186,8 @@ def picture(image):
 def runs(ax, runs):
     """Where the robot went: one line per Run.
 
-    Kidnapped runs have a look and a number each; the kidnapping is a dotted leap to a numbered dot. A circle is the rim
-    of the robot where a run first touched something.
+    Kidnapped runs have a look and a number each; the kidnapping is a dotted leap to a numbered dot.
+    A circle is the rim of the robot where a run first touched something.
     """
     apart = any(len(run.kidnapped) for run in runs)
     for k, run in enumerate(runs):
@@ -203,7 +212,9 @@ def runs(ax, runs):
 
 
 def first_contact(run):
-    """Where (2,) a Run that touched something was when its rim, taken as a circle, first met an obstacle."""
+    """Where (2,) a Run that touched something was when its rim, taken as a circle, first met an
+    obstacle.
+    """
     met = np.flatnonzero(run.clearance < 0)
     return run.true_poses[met[0] if len(met) else run.clearance.argmin(), :2]
 
@@ -217,14 +228,16 @@ def png(figure):
 
 
 def cdhmm(ax, model, sd=2.0):
-    """A SubgoalHMM in the plane: its states, the steps between them, and the most-likely path in red.
+    """A SubgoalHMM in the plane: its states, the steps between them, and the most-likely path in
+    red.
 
     Parameters
     ----------
     ax : matplotlib.axes.Axes
     model : SubgoalHMM
-        Its states as dots at their means, with their numbers and covariances; its start and its end, which have no
-        place, as words beside the states that the most-likely path begins and ends in.
+        Its states as dots at their means, with their numbers and covariances; its start and its
+        end, which have no place, as words beside the states that the most-likely path begins and
+        ends in.
     sd : float
         How many standard deviations each state's ellipse reaches.
     """
@@ -256,7 +269,9 @@ def step(ax, tail, head, width, colour):
 
 
 def ellipse(ax, mean, covariance, sd=2.0, colour=SUBGOAL, label=None):
-    """Where a normal distribution of this mean (2,) and covariance (2, 2) reaches `sd` standard deviations."""
+    """Where a normal distribution of this mean (2,) and covariance (2, 2) reaches `sd` standard
+    deviations.
+    """
     variances, axes = np.linalg.eigh(covariance)
     width, height = 2 * sd * np.sqrt(variances)
     angle = np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))

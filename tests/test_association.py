@@ -2,12 +2,12 @@
 
 import os
 from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import ROOT
 
 from dollop.association import Frames, associate, associate_with_frames, layout_turn
 from dollop.environment import Environment
@@ -243,7 +243,7 @@ def test_bad_frames_are_refused():
 def moved_objects():
     if "DOLLOP_EXTERNAL_DATA" not in os.environ:
         pytest.skip("DOLLOP_EXTERNAL_DATA is not set: no recordings of others' moved objects")
-    script = Path(__file__).parent.parent / "benchmarks" / "moved_objects.py"
+    script = ROOT / "benchmarks" / "moved_objects.py"
     spec = spec_from_file_location("moved_objects", script)
     module = module_from_spec(spec)
     spec.loader.exec_module(module)

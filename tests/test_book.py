@@ -2,13 +2,12 @@
 
 import re
 import runpy
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from places import ROOT
 
 pytest.importorskip("sphinx", reason='the book needs the extra "book"')
-ROOT = Path(__file__).parents[1]
 build = SimpleNamespace(**runpy.run_path(str(ROOT / "book" / "build.py")))
 
 STATES = {

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from places import DATA
 
 from dollop.cli import LEG_HEIGHT, main
-
-DATA = Path(__file__).parents[1] / "data"
 
 
 def test_map_and_observe_write_what_they_say(tmp_path, capsys):

@@ -10,8 +10,8 @@ from scipy.optimize import linear_sum_assignment
 
 from dollop import matching as module
 from dollop.environment import Environment, integer_costs
-from dollop.layouts import matching_shares, random_layouts, right_indices
 from dollop.matching import match, second_best
+from dollop.replication.layouts import matching_shares, random_layouts, right_indices
 
 seeds = st.integers(0, 2**32 - 1)
 shifts = st.tuples(st.floats(-50, 50), st.floats(-50, 50))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import DATA
 from rooms import FURNITURE, WALLS, room_map, scan
 
 from dollop import OccupancyGrid, SequencedLDS, Tracker, laps, observe, read_log
@@ -16,8 +17,6 @@ from dollop.laser import LaserLog
 from dollop.observation import completed, foreground_hits, static_boxes
 from dollop.tracking import Track
 from dollop.trajectory import distance_to_polyline, mean_trajectory
-
-DATA = Path(__file__).parents[1] / "data"
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import multivariate_normal
 
-from dollop.baseline import TASKS, draw_demonstrations
 from dollop.cdhmm import SubgoalHMM
 from dollop.lds import LDS, Statistics
+from dollop.replication.baseline import TASKS, draw_demonstrations
 
 SLALOM = np.array(TASKS["slalom"])
 

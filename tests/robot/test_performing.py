@@ -1,10 +1,10 @@
 """Performing: the robots' limits, runs that finish or say why not, kidnappings, and bad input."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from places import DATA
 from rooms import CANS, figure_eight_task, room_map
 
 from dollop.environment import Environment
@@ -405,6 +405,6 @@ def test_inputs_are_not_changed(task, background):
 @pytest.mark.parametrize("place", [(7.31, 0.55, -0.79), (7.19, 0.57, -2.81), (7.49, 0.5, 1.15), (7.25, 0.68, 1.61)])
 def test_the_way_out_of_a_niche_is_found(task, control, place):
     """Put between desks and a stool, with 8 cm to spare round a bend, the robot gets out and touches nothing."""
-    lab = OccupancyGrid.load(Path(__file__).parents[2] / "data" / "lab.yaml")
+    lab = OccupancyGrid.load(DATA / "lab.yaml")
     run = perform(task, Unicycle(START), control, background=lab, kidnap=[(28.0, place)])
     assert run.finished and not run.collisions

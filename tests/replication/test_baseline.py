@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from dollop.baseline import METHODS, TASKS, draw_demonstrations, gaussian_hmm, judge, plain_mean, study, summary
+from dollop.replication.baseline import (
+    METHODS,
+    TASKS,
+    draw_demonstrations,
+    gaussian_hmm,
+    judge,
+    plain_mean,
+    study,
+    summary,
+)
 
 SLALOM = np.array(TASKS["slalom"])
 

@@ -8,10 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dollop import study, trials_environment, trials_learning, trials_observing, trials_performing
-from dollop.claims import Claim, Criterion
 from dollop.cli import main
 from dollop.formats.files import FormatError
+from dollop.replication import study
+from dollop.replication.claims import Claim, Criterion
+from dollop.replication.claims import environment as trials_environment
+from dollop.replication.claims import learning as trials_learning
+from dollop.replication.claims import observing as trials_observing
+from dollop.replication.claims import performing as trials_performing
 
 
 def claim_of(experiment):

@@ -1,4 +1,6 @@
-"""The replication's experiments, from seeds: each is simulated once and shared by the figures that show it."""
+"""The replication's experiments, from seeds: each is simulated once and shared by the figures that
+show it.
+"""
 
 from functools import cache, lru_cache
 
@@ -106,7 +108,8 @@ def matched_right(k):
 
 @cache
 def matchings_from_laser(kind, count=50):
-    """Shares of layouts matched right between boxes as the laser saw them, cans or cones moved by 0.3 m (sd).
+    """Shares of layouts matched right between boxes as the laser saw them, cans or cones moved by
+    0.3 m (sd).
 
     Parameters
     ----------
@@ -142,7 +145,9 @@ def nearest(points, places):
 
 
 def slalom_layout(k, seed=SEED):
-    """A row of four cones, each moved somewhere else, and a walk past them: the k-th that has room for one."""
+    """A row of four cones, each moved somewhere else, and a walk past them: the k-th that has room
+    for one.
+    """
     from dollop.lab import rearranged, slalom, slalom_scene
 
     rng = np.random.default_rng([seed, 11, k])
@@ -171,7 +176,10 @@ def slalom_demonstration(k, seed=SEED):
 
 @cache
 def slalom_task():
-    """The task learned from two slaloms in different environments, in that of the first (Fig. 12a)."""
+    """The task learned from two slaloms in different environments, in that of the first (Fig.
+
+    12a).
+    """
     return learn([slalom_demonstration(0), slalom_demonstration(1)])
 
 
@@ -204,7 +212,9 @@ def slalom_runs(control="pursuit", avoid=True, count=10):
 
 
 def run_in_lab(task, scene, start, seed, **choices):
-    """One run of the simulated Pioneer, which localises itself with its laser, in a scene of the laboratory."""
+    """One run of the simulated Pioneer, which localises itself with its laser, in a scene of the
+    laboratory.
+    """
     from dollop.lab import LocalisedPioneer, World
 
     with World(scene) as world:
@@ -229,7 +239,9 @@ def eight_runs(control, count=10):
 
 @cache
 def kidnappings(count=5):
-    """Starts (count, 3), times (count,) and poses (count, 3) of kidnappings anywhere in the laboratory."""
+    """Starts (count, 3), times (count,) and poses (count, 3) of kidnappings anywhere in the
+    laboratory.
+    """
     task, rng = figure_eight_task(), np.random.default_rng([SEED, 7])
     starts = starts_near_the_beginning(task, count, rng)
     obstacles = ObstacleMap.of(task.environment, background_map())
@@ -256,7 +268,9 @@ def moved_runs(k, control="pursuit", avoid=True, count=10):
 
 
 def counts(runs):
-    """How many runs there were, how many finished, how often the robot hit something, and in how many runs."""
+    """How many runs there were, how many finished, how often the robot hit something, and in how
+    many runs.
+    """
     return {
         "runs": len(runs),
         "finished": sum(run.finished for run in runs),
@@ -266,13 +280,17 @@ def counts(runs):
 
 
 def passing_sides(path, centres):
-    """On which side a path (M, 2) passes each centre (N, 2): +1 leaves it to the right, -1 to the left."""
+    """On which side a path (M, 2) passes each centre (N, 2): +1 leaves it to the right, -1 to the
+    left.
+    """
     nearest_place = nearest(path, centres).clip(1, len(path) - 2)
     way, across = path[nearest_place + 1] - path[nearest_place - 1], centres - path[nearest_place]
     return -np.sign(way[:, 0] * across[:, 1] - way[:, 1] * across[:, 0])
 
 
 def same_sides(run, task, sides):
-    """Whether a run of the slalom task passes every cone on the demonstrated side, `sides` in the first layout."""
+    """Whether a run of the slalom task passes every cone on the demonstrated side, `sides` in the
+    first layout.
+    """
     partners = match(slalom_demonstration(0).environment, task.environment).indices[::4] // 4
     return bool((passing_sides(run.true_poses[:, :2], task.environment.centres[partners]) == sides).all())

@@ -1,7 +1,9 @@
-"""What merging (`dollop.cdhmm.model`) is measured against: hidden Markov models of a chosen size, and the plain mean.
+"""What merging (`dollop.cdhmm.model`) is measured against: hidden Markov models of a chosen size,
+and the plain mean.
 
-Demonstrations of known tasks are drawn with subgoals that scatter and, now and then, one subgoal that is no part of the
-task. Every method gets the same demonstrations and says what it takes for the task: subgoals in order, (L, 2).
+Demonstrations of known tasks are drawn with subgoals that scatter and, now and then, one subgoal
+that is no part of the task. Every method gets the same demonstrations and says what it takes for
+the task: subgoals in order, (L, 2).
 """
 
 import logging
@@ -24,10 +26,11 @@ TASKS = {  # subgoals in m, six each
 
 
 def draw_demonstrations(task, n, spread, extra=0.3, seed=0):
-    """Draw demonstrations of a task: each subgoal scattered, and in some of them one more that is no part of it.
+    """Draw demonstrations of a task: each subgoal scattered, and in some of them one more that is
+    no part of it.
 
-    The additional subgoal comes anywhere in the order, before the first and after the last included. Its position is
-    anywhere within the task's bounding box widened by half a metre.
+    The additional subgoal comes anywhere in the order, before the first and after the last
+    included. Its position is anywhere within the task's bounding box widened by half a metre.
 
     Parameters
     ----------
@@ -65,7 +68,9 @@ def merged(sequences, spread=0.15):
 
 
 def plain_mean(sequences):
-    """Mean of the demonstrations, subgoal by subgoal, after stretching each to their median length: (L, 2) in m."""
+    """Mean of the demonstrations, subgoal by subgoal, after stretching each to their median length:
+    (L, 2) in m.
+    """
     length = int(np.median([len(sequence) for sequence in sequences]))
     return np.mean([_stretch(np.asarray(sequence, float), length) for sequence in sequences], axis=0)
 
@@ -78,9 +83,9 @@ def _stretch(sequence, length):
 def gaussian_hmm(sequences, left_to_right=False, n_states=range(2, 11), restarts=5, seed=0, spread=0.15):
     """Subgoals by hidden Markov models of hmmlearn, the number of states chosen by BIC.
 
-    Expectation-maximisation from several random starts for each number of states; the best of each is compared by BIC.
-    The task is the sequence of states that the most demonstrations follow (Viterbi, repetitions dropped), the shorter
-    where several do.
+    Expectation-maximisation from several random starts for each number of states; the best of each
+    is compared by BIC. The task is the sequence of states that the most demonstrations follow
+    (Viterbi, repetitions dropped), the shorter where several do.
 
     Parameters
     ----------
@@ -94,7 +99,8 @@ def gaussian_hmm(sequences, left_to_right=False, n_states=range(2, 11), restarts
         Random starts for each number of states.
     seed : int
     spread : float
-        Expected standard deviation of a state in m, its covariance's prior: the same that merging is given.
+        Expected standard deviation of a state in m, its covariance's prior: the same that merging
+        is given.
 
     Returns
     -------
@@ -107,8 +113,8 @@ def gaussian_hmm(sequences, left_to_right=False, n_states=range(2, 11), restarts
     random = np.random.RandomState(seed)
     sizes = [size for size in n_states if size <= len(points)]
     blank = [_blank(size, left_to_right, random, spread) for size in sizes for _ in range(restarts)]
-    # Matrices this small are slower with several BLAS threads, many times so where these wait for a busy processor.
-    # Only what is loaded is limited: hmmlearn is, by now.
+    # Matrices this small are slower with several BLAS threads, many times so where these wait for a
+    # busy processor. Only what is loaded is limited: hmmlearn is, by now.
     with threadpool_limits(1):
         models = [_fitted(model, points, lengths) for model in blank]
         scores = [np.inf if model is None else model.bic(points, lengths) for model in models]
@@ -169,8 +175,9 @@ def judge(found, task):
     Returns
     -------
     dict
-        `right_number`; `right_order`: as many, and each nearer to its own true subgoal than to any that lies elsewhere;
-        `error`: mean distance to the true subgoals in m, nan where the number is wrong.
+        `right_number`; `right_order`: as many, and each nearer to its own true subgoal than to any
+        that lies elsewhere; `error`: mean distance to the true subgoals in m, nan where the number
+        is wrong.
     """
     found, task = np.asarray(found, float), np.asarray(task, float)
     if len(found) != len(task):
@@ -181,7 +188,8 @@ def judge(found, task):
 
 
 def study(tasks=tuple(TASKS), numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=range(100), methods=tuple(METHODS)):
-    """Let every method find every task from the same demonstrations, one subgoal too many in 30 % of them.
+    """Let every method find every task from the same demonstrations, one subgoal too many in 30 %
+    of them.
 
     Parameters
     ----------
@@ -190,14 +198,15 @@ def study(tasks=tuple(TASKS), numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=ra
     numbers : sequence of int
         Numbers of demonstrations.
     spreads : sequence of float
-        Standard deviation of a subgoal along each axis in m. The methods are not told; they expect their default.
+        Standard deviation of a subgoal along each axis in m. The methods are not told; they expect
+        their default.
     seeds : sequence of int
 
     Returns
     -------
     pandas.DataFrame
-        One row per task, number `n`, `spread`, `seed` and `method`: what `judge` says, `length` of the path found, and
-        `seconds` of processor time it took.
+        One row per task, number `n`, `spread`, `seed` and `method`: what `judge` says, `length` of
+        the path found, and `seconds` of processor time it took.
     """
     cases = list(product(tasks, numbers, spreads, seeds))
     rows = []
@@ -212,7 +221,9 @@ def study(tasks=tuple(TASKS), numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=ra
 
 
 def summary(table):
-    """Shares of right number and right order, mean error in m and median seconds, by task, spread, n and method."""
+    """Shares of right number and right order, mean error in m and median seconds, by task, spread,
+    n and method.
+    """
     groups = table.groupby(["task", "spread", "n", "method"], sort=False)
     return groups.agg(
         right_number=("right_number", "mean"),

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dollop.layouts import matching_shares, random_layouts, right_indices
 from dollop.matching import match
+from dollop.replication.layouts import matching_shares, random_layouts, right_indices
 
 
 @pytest.mark.parametrize(("change", "counts"), [("none", (3, 3)), ("missing", (3, 2)), ("added", (3, 4))])

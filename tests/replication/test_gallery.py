@@ -1,13 +1,13 @@
 """The gallery page: complete, in step with the numbers, and readable."""
 
 import json
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
-from dollop import figures, gallery
+from dollop.replication import figures, gallery
 
-FOLDER = Path(figures.__file__).parents[1] / "figures"
+FOLDER = ROOT / "figures"
 METRICS = json.loads((FOLDER / "metrics.json").read_text())
 
 

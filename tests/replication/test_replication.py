@@ -2,18 +2,17 @@
 
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 from scipy.stats import binom
 
-from dollop import baseline, experiments, study
-from dollop.claims import CLAIMS
-from dollop.layouts import matching_shares
+from dollop.replication import baseline, recordings, study
+from dollop.replication.claims import CLAIMS
+from dollop.replication.layouts import matching_shares
 from dollop.robot.performing import distances_to_law
 
-ROOT = Path(__file__).parents[1]
 GOLDEN = json.loads((ROOT / "study" / "golden.json").read_text())
 PUBLISHED = {claim["id"]: claim for claim in json.loads((ROOT / "claims.json").read_text())}
 COMMITTED = json.loads((ROOT / "figures" / "metrics.json").read_text())
@@ -126,34 +125,34 @@ def test_every_verdict_is_told():
 
 def test_fresh_runs_are_as_near_to_the_law_as_in_figure_7a():
     """Two of its runs: finished, nothing touched, as near to the response on average within 15 mm."""
-    law = experiments.figure_eight_task().law
+    law = recordings.figure_eight_task().law
     for control, end in (("plain", ""), ("pursuit", "_pursuit")):
-        runs = experiments.eight_runs(control, count=2)
-        assert experiments.counts(runs) == {"runs": 2, "finished": 2, "collisions": 0, "runs_with_collision": 0}
+        runs = recordings.eight_runs(control, count=2)
+        assert recordings.counts(runs) == {"runs": 2, "finished": 2, "collisions": 0, "runs_with_collision": 0}
         distance = np.mean([distances_to_law(run, law).mean() for run in runs])
         assert distance == pytest.approx(COMMITTED["7a"][f"mean_distance_m{end}"], abs=0.015)
 
 
 def test_a_fresh_kidnapped_run_goes_round_obstacles_as_in_figure_7b():
     """One of its kind: it finds itself again, finishes and touches nothing."""
-    (run,) = experiments.kidnapped_runs("plain", True, count=1)
+    (run,) = recordings.kidnapped_runs("plain", True, count=1)
     assert run.finished and not run.collisions and len(run.kidnapped) == 1 and not run.localised.all()
 
 
 def test_fresh_runs_among_moved_cans_finish_as_in_figure_10b():
     """One run in a layout: finished, nothing touched, no nearer than the figure's nearest within 10 cm."""
-    (run,) = experiments.moved_runs(0, count=1)
+    (run,) = recordings.moved_runs(0, count=1)
     assert run.finished and not run.collisions
     assert run.clearance.min() > COMMITTED["10b"]["min_clearance_m"] - 0.1
 
 
 def test_fresh_runs_of_the_slalom_pass_the_cones_as_in_figure_12b():
     """Two runs: finished, nothing touched, every cone on the demonstrated side."""
-    task, shown = experiments.new_slalom_task(), experiments.slalom_demonstration(0)
-    sides = experiments.passing_sides(shown.law.response(), shown.environment.centres)
-    runs = experiments.slalom_runs(count=2)
+    task, shown = recordings.new_slalom_task(), recordings.slalom_demonstration(0)
+    sides = recordings.passing_sides(shown.law.response(), shown.environment.centres)
+    runs = recordings.slalom_runs(count=2)
     assert [run.finished and not run.collisions for run in runs] == [True, True]
-    assert all(experiments.same_sides(run, task, sides) for run in runs)
+    assert all(recordings.same_sides(run, task, sides) for run in runs)
 
 
 def test_fresh_layouts_are_matched_as_often_as_in_figure_x1():
@@ -161,7 +160,7 @@ def test_fresh_layouts_are_matched_as_often_as_in_figure_x1():
     for row in matching_shares(noises=(0.05,), layouts=60, seed=1).itertuples():
         assert row.right == pytest.approx(COMMITTED["x1"][f"{row.objects}_objects_{row.method}"], abs=0.2)
     for kind in ("cans", "cones"):
-        for method, share in experiments.matchings_from_laser(kind, count=10).items():
+        for method, share in recordings.matchings_from_laser(kind, count=10).items():
             assert share == pytest.approx(COMMITTED["x1"][f"{kind}_seen_{method}"], abs=0.4)
 
 

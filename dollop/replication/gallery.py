@@ -1,4 +1,5 @@
-"""The gallery: every panel with its caption, what to look at, and its numbers, as one page of Markdown.
+"""The gallery: every panel with its caption, what to look at, and its numbers, as one page of
+Markdown.
 
 Captions carry no measured numbers: those come from metrics.json, so that they cannot drift apart.
 """
@@ -17,7 +18,8 @@ class Panel:
     look : str
         What to look at, and what to make of it.
     columns : dict
-        Where the numbers are of several things: how their names end in metrics.json, and what each thing is.
+        Where the numbers are of several things: how their names end in metrics.json, and what each
+        thing is.
     """
 
     caption: str
@@ -26,7 +28,9 @@ class Panel:
 
 
 def panel(caption, look, **columns):
-    """A Panel; `plain="..."` is a column of numbers whose names end in _plain, `own="..."` of those that do not."""
+    """A Panel; `plain="..."` is a column of numbers whose names end in _plain, `own="..."` of those
+    that do not.
+    """
     return Panel(caption, look, {"" if end == "own" else f"_{end}": words for end, words in columns.items()})
 
 

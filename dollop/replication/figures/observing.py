@@ -5,9 +5,10 @@ import numpy as np
 from matplotlib.patches import ConnectionPatch, Rectangle
 
 import dollop
-from dollop import experiments, plot
+from dollop import plot
 from dollop.foreground import ForegroundGrid, endpoints, foreground_mask
 from dollop.observation import STATIC_EVERY, foreground_hits, static_boxes
+from dollop.replication import recordings
 
 GAIN, STATIC_GAIN = 0.6, 0.1  # defaults of `dollop.observe`
 
@@ -20,7 +21,9 @@ def figure_1():
 
 
 def figure_2():
-    """Conceptual flow diagram of Dollop: each stage in the paper's words, what does it here, what it hands on."""
+    """Conceptual flow diagram of Dollop: each stage in the paper's words, what does it here, what
+    it hands on.
+    """
     figure, ax = plt.subplots(figsize=(13, 4.6))
     for corner, size, words in FRAMES:
         draw_frame(ax, corner, size, words)
@@ -90,7 +93,7 @@ def draw_step(ax, before, after):
 
 def figure_3():
     """One sample laser scan in the laboratory."""
-    log = experiments.figure_eights().log
+    log = recordings.figure_eights().log
     figure, ax = plt.subplots(figsize=(6, 4.7))
     i = scan_beside_the_cans(log)
     plot.scan(ax, log, i)
@@ -101,14 +104,16 @@ def figure_3():
 
 
 def scan_beside_the_cans(log):
-    """A scan in which both cans and the walker are in sight: the first after a quarter of the first lap."""
+    """A scan in which both cans and the walker are in sight: the first after a quarter of the first
+    lap.
+    """
     return int(np.searchsorted(log.t, log.t[0] + 6.0))
 
 
 def figure_4():
     """Flow diagram for observing the user, each stage with its own intermediate picture."""
-    recording, grid = experiments.figure_eights(), experiments.background_map()
-    log, observation = recording.log, experiments.figure_eights_observed()
+    recording, grid = recordings.figure_eights(), recordings.background_map()
+    log, observation = recording.log, recordings.figure_eights_observed()
     i = scan_beside_the_cans(log)
     figure, axes = plt.subplots(2, 4, figsize=(10, 5.2), sharex=True, sharey=True)
     figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
@@ -150,7 +155,9 @@ FLOW = (
 
 
 def connect(figure, before, after):
-    """An arrow from one stage to another, which stands to its right, below it, or to its upper right."""
+    """An arrow from one stage to another, which stands to its right, below it, or to its upper
+    right.
+    """
     start, end = (ax.get_subplotspec() for ax in (before, after))
     if start.colspan == end.colspan:
         places = (0.5, -0.02), (0.5, 1.17)
@@ -161,7 +168,9 @@ def connect(figure, before, after):
 
 
 def draw_memory(ax, log, grid, scans, gain):
-    """A foreground grid that has taken in some scans: the darker a cell, the surer it is. Returns the grid."""
+    """A foreground grid that has taken in some scans: the darker a cell, the surer it is. Returns
+    the grid.
+    """
     foreground, hits = ForegroundGrid(grid, gain), foreground_hits(log, grid)
     for k in scans:
         foreground.update(hits[k], log.poses[k], log.angles, log.ranges[k])
@@ -191,7 +200,7 @@ def figure_5():
     """The laboratory with two obstacles about four metres apart."""
     from dollop.lab import render_lab
 
-    recording = experiments.figure_eights()
+    recording = recordings.figure_eights()
     return plot.picture(render_lab(recording.scene)), {}
 
 
@@ -202,10 +211,10 @@ def figure_6a():
     """The user's track over five figure-eights, with obstacles and robot."""
     from dollop.lab.truth import track_error
 
-    recording, observation = experiments.figure_eights(), experiments.figure_eights_observed()
+    recording, observation = recordings.figure_eights(), recordings.figure_eights_observed()
     user, sensor = observation.user, recording.log.poses[0]
     figure, ax = plt.subplots(figsize=SIZE)
-    plot.workspace(experiments.background_map(), sensor, observation.environment.boxes, ax)
+    plot.workspace(recordings.background_map(), sensor, observation.environment.boxes, ax)
     plot.track(ax, user, "user's track", linewidth=0.8)
     plot.legend_below(figure, ax)
     bias, errors = track_error(user, recording.truth, sensor)

@@ -2,18 +2,18 @@
 
 import json
 import sys
-from pathlib import Path
 
 import pytest
+from places import ROOT
 
-from dollop import figures
+from dollop.replication import figures
 
-COMMITTED = json.loads((Path(__file__).parents[1] / "figures" / "metrics.json").read_text())
+COMMITTED = json.loads((ROOT / "figures" / "metrics.json").read_text())
 
 
 def test_every_panel_is_committed():
     """Each figure has its picture and its entry in metrics.json."""
-    folder = Path(figures.__file__).parents[1] / "figures"
+    folder = ROOT / "figures"
     for panel in figures.FIGURES:
         assert panel in COMMITTED
         assert (folder / figures.name_of(panel)).stat().st_size > 5_000

@@ -1,10 +1,13 @@
-"""Experiments on observing the user (Sec. II): each is a function of a seed that returns its numbers.
+"""Experiments on observing the user (Sec. II): each is a function of a seed that returns its
+numbers.
 
-See `dollop.claims` for what is asked of them. Experiments of one seed share its recordings (`dollop.experiments`).
+See `dollop.replication.claims` for what is asked of them. Experiments of one seed share its
+recordings (`dollop.replication.recordings`).
 
-Where the truth is known, an estimate is compared with the place where a centroid of the walker is expected: the true
-place, moved towards the sensor by the mean distance between the walker and the centroids of that recording. The laser
-sees the near side only; this constant bias is told, and taken out of the errors.
+Where the truth is known, an estimate is compared with the place where a centroid of the walker is
+expected: the true place, moved towards the sensor by the mean distance between the walker and the
+centroids of that recording. The laser sees the near side only; this constant bias is told, and
+taken out of the errors.
 """
 
 from functools import lru_cache
@@ -12,11 +15,11 @@ from math import nan
 
 import numpy as np
 
-from dollop import experiments
 from dollop.foreground import near_together, seen_free
 from dollop.lab.person import smooth_path, walk
 from dollop.laser import LaserLog
 from dollop.observation import observe
+from dollop.replication import recordings
 from dollop.tracking import (
     Motion,
     Tracker,
@@ -51,7 +54,9 @@ def lines_of_sight(places, recording):
 
 
 def near_side_bias(user, recording):
-    """Mean distance in m by which the centroids of a track are nearer to the laser than the walker is."""
+    """Mean distance in m by which the centroids of a track are nearer to the laser than the walker
+    is.
+    """
     true = true_places(user.t, recording)
     return np.nanmean(((true - user.measurements) * lines_of_sight(true, recording)).sum(axis=1))
 
@@ -63,11 +68,13 @@ def expected_centroids(user, recording):
 
 
 def centroid(seed):
-    """Noise of the centroids per axis, with the laser as it is and with an ideal one on the same walk."""
+    """Noise of the centroids per axis, with the laser as it is and with an ideal one on the same
+    walk.
+    """
     spreads = []
     for recording, observation in (
-        (experiments.figure_eights(seed), experiments.figure_eights_observed(seed)),
-        (eights_seen_ideally(seed), observe(eights_seen_ideally(seed).log, experiments.background_map())),
+        (recordings.figure_eights(seed), recordings.figure_eights_observed(seed)),
+        (eights_seen_ideally(seed), observe(eights_seen_ideally(seed).log, recordings.background_map())),
     ):
         off = observation.user.measurements - expected_centroids(observation.user, recording)
         spreads.append(np.sqrt(np.nanmean(off**2)))
@@ -79,8 +86,10 @@ def centroid(seed):
 
 
 def filtering(seed):
-    """How much nearer to the truth the Kalman filter is than the centroids, in position and in velocity."""
-    user, recording = experiments.figure_eights_observed(seed).user, experiments.figure_eights(seed)
+    """How much nearer to the truth the Kalman filter is than the centroids, in position and in
+    velocity.
+    """
+    user, recording = recordings.figure_eights_observed(seed).user, recordings.figure_eights(seed)
     expected = expected_centroids(user, recording)
     true_velocity = np.gradient(true_places(user.t, recording), user.t, axis=0)
     filtered = causal_states(user.t, user.measurements, Motion())
@@ -103,7 +112,9 @@ def filtering(seed):
 # ---- predicting a hidden walker
 
 VELOCITY, ACCELERATION = Motion(2, noise=0.533), Motion(3, noise=0.3)
-"""For `velocity`: each with the noise that suits it best, chosen by `chosen_noise` on seeds the study does not use."""
+"""For `velocity`: each with the noise that suits it best, chosen by `chosen_noise` on seeds the
+study does not use.
+"""
 
 NOISES = tuple(float(noise) for noise in np.round(np.geomspace(0.03, 30, 13), 3))
 
@@ -114,13 +125,16 @@ def behind_cans(user):
 
 
 def now_and_then(user, every=4.0, length=1.0):
-    """The centroids with one second in four taken away, from the third on, and where that hides a visible walker."""
+    """The centroids with one second in four taken away, from the third on, and where that hides a
+    visible walker.
+    """
     hidden = ((user.t - user.t[0]) % every >= every - length) & ~user.occluded
     return np.where(hidden[:, None], nan, user.measurements), hidden
 
 
 def chosen_noise(order, hides=(behind_cans, now_and_then), predictor=None, seeds=range(10_000, 10_010)):
-    """The spectral density with which hidden walkers are predicted best, on average over ways to hide.
+    """The spectral density with which hidden walkers are predicted best, on average over ways to
+    hide.
 
     Parameters
     ----------
@@ -129,8 +143,8 @@ def chosen_noise(order, hides=(behind_cans, now_and_then), predictor=None, seeds
     hides : sequence of callable
         User's track to the centroids shown and where the walker is hidden.
     predictor : callable, optional
-        predictor(recording, user, seed) is what predicts, as `causal_states` takes it; the Kalman prediction by
-        default.
+        predictor(recording, user, seed) is what predicts, as `causal_states` takes it; the Kalman
+        prediction by default.
     seeds : iterable of int
 
     Returns
@@ -140,7 +154,7 @@ def chosen_noise(order, hides=(behind_cans, now_and_then), predictor=None, seeds
     """
     errors = np.zeros(len(NOISES))
     for seed in seeds:
-        recording, user = experiments.figure_eights(seed), experiments.figure_eights_observed(seed).user
+        recording, user = recordings.figure_eights(seed), recordings.figure_eights_observed(seed).user
         expected = expected_centroids(user, recording)
         for hide in hides:
             shown, hidden = hide(user)
@@ -152,12 +166,14 @@ def chosen_noise(order, hides=(behind_cans, now_and_then), predictor=None, seeds
 
 
 def causal_states(t, shown, motion, carry_on=None):
-    """State (N, n, 2) at each scan from the scans so far, predicted where the centroids `shown` (N, 2) are nan.
+    """State (N, n, 2) at each scan from the scans so far, predicted where the centroids `shown` (N,
+    2) are nan.
 
     Parameters
     ----------
     carry_on : callable, optional
-        carry_on(i, means, covariances, F, Q) predicts over scans out of sight; the Kalman prediction by default.
+        carry_on(i, means, covariances, F, Q) predicts over scans out of sight; the Kalman
+        prediction by default.
     """
     means, covariances = motion.birth(shown[:1])
     states = [means[0]]
@@ -182,8 +198,10 @@ def standing_still(i, means, covariances, F, Q):
 
 
 def velocity(seed):
-    """How far predictions of a hidden walker are off, with velocity, with acceleration as well, with neither."""
-    user, recording = experiments.figure_eights_observed(seed).user, experiments.figure_eights(seed)
+    """How far predictions of a hidden walker are off, with velocity, with acceleration as well,
+    with neither.
+    """
+    user, recording = recordings.figure_eights_observed(seed).user, recordings.figure_eights(seed)
     expected = expected_centroids(user, recording)
     numbers = {}
     for name, hide in (("cans", behind_cans), ("anywhere", now_and_then)):
@@ -202,7 +220,9 @@ def velocity(seed):
 
 
 def particles_of(recording, user, seed):
-    """Prediction by particles that die where the laser would have seen them, as `causal_states` takes it."""
+    """Prediction by particles that die where the laser would have seen them, as `causal_states`
+    takes it.
+    """
     log, scans = recording.log, np.searchsorted(recording.log.t, user.t)
 
     def visible(i, points):
@@ -212,12 +232,16 @@ def particles_of(recording, user, seed):
 
 
 def blind_particles_of(recording, user, seed):
-    """Prediction by particles that know nothing of where the laser sees free space, as `causal_states` takes it."""
+    """Prediction by particles that know nothing of where the laser sees free space, as
+    `causal_states` takes it.
+    """
     return particles(np.random.default_rng([seed, 2]))
 
 
 def particles(rng, visible=None):
-    """Prediction by particles; with visible(i, points), those that would have been seen in scan i die."""
+    """Prediction by particles; with visible(i, points), those that would have been seen in scan i
+    die.
+    """
     clouds = {}
 
     def carry_on(i, means, covariances, F, Q):
@@ -237,13 +261,15 @@ PREDICTORS = {
     "particles": (Motion(2, noise=0.3), particles_of),
     "blind": (Motion(2, noise=0.3), blind_particles_of),
 }
-"""For `prediction`: motion model and what predicts, each with the noise that suits it best behind the cans, chosen by
-`chosen_noise(2, (behind_cans,), predictor)`."""
+"""For `prediction`: motion model and what predicts, each with the noise that suits it best behind
+the cans, chosen by `chosen_noise(2, (behind_cans,), predictor)`."""
 
 
 def prediction(seed, missed=0.5):
-    """Predictions of the walker behind the cans by the Kalman filter and by particles; a miss is 0.5 m or more."""
-    user, recording = experiments.figure_eights_observed(seed).user, experiments.figure_eights(seed)
+    """Predictions of the walker behind the cans by the Kalman filter and by particles; a miss is
+    0.5 m or more.
+    """
+    user, recording = recordings.figure_eights_observed(seed).user, recordings.figure_eights(seed)
     expected = expected_centroids(user, recording)
     shown, hidden = behind_cans(user)
     last = hidden & ~np.append(hidden[1:], False)
@@ -263,8 +289,10 @@ def prediction(seed, missed=0.5):
 
 
 def straight(seed):
-    """How far Kalman predictions of a walker behind the cans are from a straight line, and the walker's own way."""
-    user, recording = experiments.figure_eights_observed(seed).user, experiments.figure_eights(seed)
+    """How far Kalman predictions of a walker behind the cans are from a straight line, and the
+    walker's own way.
+    """
+    user, recording = recordings.figure_eights_observed(seed).user, recordings.figure_eights(seed)
     predicted, true = causal_states(user.t, user.measurements, Motion())[:, 0], true_places(user.t, recording)
     spans = [rows for rows in spans_of(user.occluded) if len(rows) >= 3]
     return {
@@ -288,7 +316,8 @@ def bend(path):
 
 
 def crossing_walkers(n, rng, side=6.0, duration=30.0, blob=0.4, noise=0.03):
-    """Walkers at 1 m/s on smooth ways through a square, as centroids; nearer to each other than `blob` they are one.
+    """Walkers at 1 m/s on smooth ways through a square, as centroids; nearer to each other than
+    `blob` they are one.
 
     Returns
     -------
@@ -336,11 +365,12 @@ def greedy(seed):
 
 
 def interpolation(seed):
-    """Error of the user's track where the user was out of sight, with and without the bias, and how often it was lost.
+    """Error of the user's track where the user was out of sight, with and without the bias, and how
+    often it was lost.
 
     Losses are told per lap, of which there are five.
     """
-    observation, recording = experiments.figure_eights_observed(seed), experiments.figure_eights(seed)
+    observation, recording = recordings.figure_eights_observed(seed), recordings.figure_eights(seed)
     user = observation.user
     expected = expected_centroids(user, recording)
     errors = np.linalg.norm(user.positions - expected, axis=1)
@@ -356,13 +386,14 @@ def interpolation(seed):
 
 
 def fastest(seed):
-    """How often the user is who walks faster: alone, and while another one strolls between the robot and the user.
+    """How often the user is who walks faster: alone, and while another one strolls between the
+    robot and the user.
 
-    As the paper has it, the track with the highest velocity from scan to scan; and as `identify_user` does, for
-    which only visible ones can become the user, and only after some time.
+    As the paper has it, the track with the highest velocity from scan to scan; and as
+    `identify_user` does, for which only visible ones can become the user, and only after some time.
     """
-    recording, alone = experiments.figure_eights(seed), experiments.figure_eights_observed(seed)
-    both = observe(with_stroller(recording, seed).log, experiments.background_map())
+    recording, alone = recordings.figure_eights(seed), recordings.figure_eights_observed(seed)
+    both = observe(with_stroller(recording, seed).log, recordings.background_map())
     t = recording.log.t
     true = true_places(t, recording)
     expected = true - near_side_bias(alone.user, recording) * lines_of_sight(true, recording)
@@ -379,7 +410,9 @@ BRISK = 0.6
 
 
 def fastest_tracks(t, tracks):
-    """Index of the track with the highest estimated velocity at each time (T,), hidden ones included."""
+    """Index of the track with the highest estimated velocity at each time (T,), hidden ones
+    included.
+    """
     speeds = np.zeros((len(t), len(tracks)))
     for k, track in enumerate(tracks):
         speeds[np.searchsorted(t, track.t), k] = track.speeds
@@ -387,7 +420,9 @@ def fastest_tracks(t, tracks):
 
 
 def named_right(users, tracks, t, expected, within=0.5):
-    """Whether the track that is taken for the user at each time (T,) is within 0.5 m of `expected` (T, 2)."""
+    """Whether the track that is taken for the user at each time (T,) is within 0.5 m of `expected`
+    (T, 2).
+    """
     right = np.zeros(len(t), bool)
     for k, track in enumerate(tracks):
         rows = np.searchsorted(t, track.t)
@@ -397,9 +432,11 @@ def named_right(users, tracks, t, expected, within=0.5):
 
 
 def with_stroller(recording, seed):
-    """The recording with a second, slower walker, who strolls to and fro between the robot and the user.
+    """The recording with a second, slower walker, who strolls to and fro between the robot and the
+    user.
 
-    Both were seen by the same laser in the same scene, one at a time: a beam ends at the nearer of the two.
+    Both were seen by the same laser in the same scene, one at a time: a beam ends at the nearer of
+    the two.
     """
     from dollop.lab import record
 

@@ -1,6 +1,7 @@
-"""Experiments on the environment configuration (Sec. IV): each is a function of a seed that returns its numbers.
+"""Experiments on the environment configuration (Sec. IV): each is a function of a seed that returns
+its numbers.
 
-See `dollop.claims` for what is asked of them.
+See `dollop.replication.claims` for what is asked of them.
 """
 
 from functools import cache, lru_cache
@@ -11,15 +12,15 @@ from time import perf_counter
 import numpy as np
 from scipy.optimize import linprog
 
-from dollop import experiments
 from dollop.environment import integer_costs
 from dollop.lab.person import figure_eight
 from dollop.lab.scenes import Scene, figure_eight_scene, rearranged
-from dollop.layouts import random_layouts, right_indices
 from dollop.matching import match
 from dollop.observation import observe
+from dollop.replication import recordings
+from dollop.replication.claims.performing import clear_of, is_eight, run_plainly
+from dollop.replication.layouts import random_layouts, right_indices
 from dollop.task import anchors
-from dollop.trials_performing import clear_of, is_eight, run_plainly
 
 # ---- matching
 
@@ -41,7 +42,9 @@ def matching_time(seed, objects=50):
 
 
 def optimal(seed):
-    """The Hungarian method beside linear programming (ten objects) and beside every bijection (two objects)."""
+    """The Hungarian method beside linear programming (ten objects) and beside every bijection (two
+    objects).
+    """
     rng = np.random.default_rng([seed, 16])
     ten, two = (random_layouts(objects, rng, room=room)[:2] for objects, room in ((10, 12.0), (2, 6.0)))
     costs = integer_costs(ten[0].corners, ten[1].corners)
@@ -56,7 +59,9 @@ def optimal(seed):
 
 
 def assignment_program(costs):
-    """The assignment of least cost (N, N) as a linear program: shares in [0, 1], each row and each column sums to 1."""
+    """The assignment of least cost (N, N) as a linear program: shares in [0, 1], each row and each
+    column sums to 1.
+    """
     n = len(costs)
     rows, columns = np.kron(np.eye(n), np.ones(n)), np.kron(np.ones(n), np.eye(n))
     return linprog(costs.ravel(), A_eq=np.vstack([rows, columns]), b_eq=np.ones(2 * n), bounds=(0, 1))
@@ -69,7 +74,9 @@ def bijections(n):
 
 
 def counterintuitive(seed, layouts=10):
-    """How often a matching of three boxes that each moved a little is not the obvious one, and whether in ten once."""
+    """How often a matching of three boxes that each moved a little is not the obvious one, and
+    whether in ten once.
+    """
     rng = np.random.default_rng([seed, 7])
     numbers = {}
     for name, noise in (("exact", 0.0), ("seen", 0.05)):
@@ -89,13 +96,13 @@ def moved_eight(seed):
     from dollop.lab import watch
 
     scene = rearranged(figure_eight_scene(), np.random.default_rng([seed, 8]), reach=0.4, spacing=1.0)
-    seen = [observe(watch(scene, [seed, 8, k]).log, experiments.background_map()).environment for k in range(2)]
+    seen = [observe(watch(scene, [seed, 8, k]).log, recordings.background_map()).environment for k in range(2)]
     return scene, *seen
 
 
 def consistent(seed):
     """Whether two looks at the same moved cans give the same matching, and how long one takes."""
-    before, looks = experiments.figure_eight_task(seed).environment, in_one_order(moved_eight(seed)[1:])
+    before, looks = recordings.figure_eight_task(seed).environment, in_one_order(moved_eight(seed)[1:])
     numbers = {"seconds": least_time(lambda: match(before, looks[0], method="literal"))}
     for method in ("literal", "robust"):
         first, second = (match(before, now, method=method).indices for now in looks)
@@ -109,9 +116,11 @@ def in_one_order(environments):
 
 
 def counted(seed):
-    """Share of demonstrations, a figure-eight and three slaloms, in which the robot sees another number of objects."""
-    eight = len(experiments.figure_eight_task(seed).environment)
-    slaloms = [len(experiments.slalom_demonstration(k, seed).environment) for k in range(3)]
+    """Share of demonstrations, a figure-eight and three slaloms, in which the robot sees another
+    number of objects.
+    """
+    eight = len(recordings.figure_eight_task(seed).environment)
+    slaloms = [len(recordings.slalom_demonstration(k, seed).environment) for k in range(3)]
     return {"other_number": np.mean([eight != 2, *(number != 4 for number in slaloms)])}
 
 
@@ -119,14 +128,16 @@ def counted(seed):
 
 
 def moved(seed):
-    """Whether the task adapted to moved cans is still a figure-eight, and whether law and robot keep clear of them."""
+    """Whether the task adapted to moved cans is still a figure-eight, and whether law and robot
+    keep clear of them.
+    """
     scene, now, _ = moved_eight(seed)
-    shown = experiments.figure_eight_task(seed)
+    shown = recordings.figure_eight_task(seed)
     try:
         task = shown.adapt(now)
     except ValueError:  # an ambiguous matching: it asks instead of guessing
         return {"refused": 1.0, "eight": nan, "law_clear": nan, "robot_clear": nan, "subgoals_moved_m": nan}
-    (start,) = experiments.starts_near_the_beginning(task, 1, np.random.default_rng([seed, 9]))
+    (start,) = recordings.starts_near_the_beginning(task, 1, np.random.default_rng([seed, 9]))
     run = run_plainly(task, start)
     return {
         "refused": 0.0,
@@ -138,13 +149,14 @@ def moved(seed):
 
 
 def single(seed):
-    """How far laws are from what a user walks when one can has moved: subgoals tied to objects, and moved as a whole.
+    """How far laws are from what a user walks when one can has moved: subgoals tied to objects, and
+    moved as a whole.
 
-    As a whole: by one scaling and one shift of the trajectory, those that carry the cans best to where they are now;
-    or by a turn as well. Beside them the law that nobody adapted.
+    As a whole: by one scaling and one shift of the trajectory, those that carry the cans best to
+    where they are now; or by a turn as well. Beside them the law that nobody adapted.
     """
     walks, scene, now = one_can_moved(seed)
-    task = experiments.figure_eight_task(seed)
+    task = recordings.figure_eight_task(seed)
     matching = match(task.environment, now)
     law, partners = task.law, matching.indices[::4] // 4
     before, after = task.environment.centres[partners >= 0], now.centres[partners[partners >= 0]]
@@ -162,7 +174,9 @@ def single(seed):
 
 
 def one_can_moved(seed):
-    """Three figure-eights (N, 2) as a user walks them when one can has moved by some 0.4 m, the scene, and its look."""
+    """Three figure-eights (N, 2) as a user walks them when one can has moved by some 0.4 m, the
+    scene, and its look.
+    """
     from dollop.lab import watch
 
     for k in range(100):
@@ -174,12 +188,14 @@ def one_can_moved(seed):
             walks = [figure_eight(scene, rng, laps=1).positions[::5] for _ in range(3)]
         except ValueError:  # no room to walk round this one
             continue
-        return walks, scene, observe(watch(scene, [seed, 17]).log, experiments.background_map()).environment
+        return walks, scene, observe(watch(scene, [seed, 17]).log, recordings.background_map()).environment
     raise RuntimeError("no layout with room for a figure-eight in 100 draws")
 
 
 def scaling(before, after):
-    """The factor and the shift, as complex numbers, with which before * factor + shift is nearest to after."""
+    """The factor and the shift, as complex numbers, with which before * factor + shift is nearest
+    to after.
+    """
     x, y = (points @ (1, 1j) for points in (before, after))
     factor = ((x - x.mean()).conj() @ (y - y.mean())).real / (np.abs(x - x.mean()) ** 2).sum()
     return factor, y.mean() - factor * x.mean()

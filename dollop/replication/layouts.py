@@ -12,7 +12,8 @@ _CHANGES = {"none": (0, 0), "missing": (0, 1), "added": (1, 0)}
 
 
 def random_layouts(objects, generator, noise=0.05, moved=0.4, room=6.0, size=0.4, gap=0.4, change="none", turn=0.0):
-    """Boxes that stand anywhere in a room, then moved a little, and seen inexactly before and after.
+    """Boxes that stand anywhere in a room, then moved a little, and seen inexactly before and
+    after.
 
     Parameters
     ----------
@@ -25,8 +26,8 @@ def random_layouts(objects, generator, noise=0.05, moved=0.4, room=6.0, size=0.4
     moved : float
         Standard deviation of each object's move per axis, in m.
     room, size, gap : float
-        Side of the room, side of a box, and the least gap between two boxes along x or y before and after the move,
-        in m. With less than about 0.4 m nobody could walk between them.
+        Side of the room, side of a box, and the least gap between two boxes along x or y before and
+        after the move, in m. With less than about 0.4 m nobody could walk between them.
     change : {"none", "missing", "added"}
         Whether afterwards one of the objects is missing, or another one has come.
     turn : float
@@ -71,7 +72,9 @@ def _seen(centres, size, noise, generator):
 
 
 def right_indices(partners, turn=0.0):
-    """(4N,) true indices of the corners, given the true partner of each object and the layout's turn in rad."""
+    """(4N,) true indices of the corners, given the true partner of each object and the layout's
+    turn in rad.
+    """
     corners = (np.arange(4) + round(turn / (np.pi / 2))) % 4
     return np.where(partners[:, None] >= 0, 4 * partners[:, None] + corners, -1).ravel()
 
@@ -79,7 +82,8 @@ def right_indices(partners, turn=0.0):
 def matching_shares(
     objects=(2, 3, 4), noises=(0.0, 0.05, 0.1, 0.2), changes=("none",), layouts=300, seed=0, turn=0.0, **properties
 ):
-    """How often the corners are matched right, by method, number of objects and box noise (figure x1).
+    """How often the corners are matched right, by method, number of objects and box noise (figure
+    x1).
 
     Parameters
     ----------
@@ -97,10 +101,10 @@ def matching_shares(
     Returns
     -------
     pandas.DataFrame
-        One row per combination and method: change, objects, noise (m), method, right (share of layouts with all corners
-        right), right_objects (with all objects right, whichever their corners), confident (share reported so),
-        right_if_confident (share of these with all objects right), layouts. The literal method, being a bijection, has
-        no rows where the count changes.
+        One row per combination and method: change, objects, noise (m), method, right (share of
+        layouts with all corners right), right_objects (with all objects right, whichever their
+        corners), confident (share reported so), right_if_confident (share of these with all objects
+        right), layouts. The literal method, being a bijection, has no rows where the count changes.
     """
     rows = []
     for change, n, noise in product(changes, objects, noises):

@@ -5,8 +5,9 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from dollop import baseline, experiments, plot
-from dollop.figures_performing import CONTROLS, at_once, draw_runs, least_clearance
+from dollop import plot
+from dollop.replication import baseline, recordings
+from dollop.replication.figures.performing import CONTROLS, at_once, draw_runs, least_clearance
 
 SIZE = (6, 5.2)
 SPREAD = 0.15  # m, standard deviation of a subgoal in figure x2
@@ -20,10 +21,11 @@ LINES = {  # method: name in the metrics, marker, seeds, numbers of demonstratio
 
 
 def figure_x2():
-    """Beyond the paper: the task found, and how far off, against the number of demonstrations; merging beside others.
+    """Beyond the paper: the task found, and how far off, against the number of demonstrations;
+    merging beside others.
 
-    A slalom of six subgoals, in 30 % of the demonstrations one more that is no part of it. hmmlearn takes far longer,
-    so it gets fewer seeds: the bars, 95 % intervals, say what that costs.
+    A slalom of six subgoals, in 30 % of the demonstrations one more that is no part of it. hmmlearn
+    takes far longer, so it gets fewer seeds: the bars, 95 % intervals, say what that costs.
     """
     table = found_by_all()
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4))
@@ -57,7 +59,9 @@ def found(method, n, seed):
 
 
 def expected_error(n):
-    """Mean distance in m of the mean of n subgoals to the true one: that of a Rayleigh distribution."""
+    """Mean distance in m of the mean of n subgoals to the true one: that of a Rayleigh
+    distribution.
+    """
     return SPREAD * np.sqrt(np.pi / 2 / n)
 
 
@@ -79,7 +83,9 @@ def draw_errors(ax, method, rows):
 
 
 def measured(table):
-    """Shares, errors and seeds by method for a few numbers of demonstrations, and how merging's error falls with n."""
+    """Shares, errors and seeds by method for a few numbers of demonstrations, and how merging's
+    error falls with n.
+    """
     metrics = {}
     for (method, n), rows in table[table.n.isin(FEW)].groupby(["method", "n"], sort=False):
         name = LINES[method][0]
@@ -104,9 +110,9 @@ def figure_11b():
 
 def draw_demonstration(k):
     """A demonstration as the laser saw it, and what it is made of."""
-    recording, shown = experiments.slalom_recording(k), experiments.slalom_demonstration(k)
+    recording, shown = recordings.slalom_recording(k), recordings.slalom_demonstration(k)
     figure, ax = plt.subplots(figsize=SIZE)
-    plot.workspace(experiments.background_map(), recording.scene.robot, shown.environment.boxes, ax)
+    plot.workspace(recordings.background_map(), recording.scene.robot, shown.environment.boxes, ax)
     (walk,) = shown.trajectory
     plot.law(ax, shown.law.response(), linewidth=4, alpha=0.6)
     plot.path(ax, walk, "user's track", linewidth=1)
@@ -116,10 +122,12 @@ def draw_demonstration(k):
 
 
 def figure_12a():
-    """The CDHMM merged from both demonstrations, in the environment of the first; the most-likely path in red."""
-    task = experiments.slalom_task()
+    """The CDHMM merged from both demonstrations, in the environment of the first; the most-likely
+    path in red.
+    """
+    task = recordings.slalom_task()
     figure, ax = plt.subplots(figsize=SIZE)
-    plot.workspace(experiments.background_map(), None, task.environment.boxes, ax)
+    plot.workspace(recordings.background_map(), None, task.environment.boxes, ax)
     for k, (sequence, marker) in enumerate(zip(task.model.sequences, "o^", strict=True)):
         label = f"subgoals of demonstration {k + 1}"
         ax.plot(*sequence.T, marker, color=plot.USER, markersize=4, zorder=6, label=label)
@@ -135,20 +143,23 @@ def figure_12a():
 
 
 def figure_12b():
-    """The task in an environment that nobody demonstrated it in: the paper's kind of control, and Dollop's own."""
-    task, shown = experiments.new_slalom_task(), experiments.slalom_demonstration(0)
-    sides = experiments.passing_sides(shown.law.response(), shown.environment.centres)
+    """The task in an environment that nobody demonstrated it in: the paper's kind of control, and
+    Dollop's own.
+    """
+    task, shown = recordings.new_slalom_task(), recordings.slalom_demonstration(0)
+    sides = recordings.passing_sides(shown.law.response(), shown.environment.centres)
     figure, axes = plt.subplots(2, 1, figsize=(8, 6.4), sharex=True)
     metrics = {}
-    runs_of = at_once(experiments.slalom_runs, [choices for _, choices in CONTROLS.values()])
+    runs_of = at_once(recordings.slalom_runs, [choices for _, choices in CONTROLS.values()])
     for ax, (suffix, (title, _)), runs in zip(axes, CONTROLS.items(), runs_of, strict=True):
         draw_runs(ax, task, runs, title)
         plot.subgoals(ax, task.law.subgoals)
         ax.set(xlim=(0.6, 8.4), ylim=(2.2, 4.8))
-        numbers = experiments.counts(runs) | {"min_clearance_m": least_clearance(runs)}
+        numbers = recordings.counts(runs) | {"min_clearance_m": least_clearance(runs)}
         metrics = {f"{key}{suffix}": value for key, value in numbers.items()} | metrics
-    # Not asked of the plain law's runs: a robot that backs off the cone it touched faces any way there.
-    metrics["passed_on_the_demonstrated_side"] = sum(experiments.same_sides(run, task, sides) for run in runs_of[-1])
+    # Not asked of the plain law's runs: a robot that backs off the cone it touched faces any way
+    # there.
+    metrics["passed_on_the_demonstrated_side"] = sum(recordings.same_sides(run, task, sides) for run in runs_of[-1])
     axes[0].set_xlabel("")
     plot.legend_below(figure, *axes)
     return figure, metrics

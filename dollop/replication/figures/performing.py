@@ -4,7 +4,8 @@ import joblib
 import matplotlib.pyplot as plt
 import numpy as np
 
-from dollop import experiments, plot
+from dollop import plot
+from dollop.replication import recordings
 from dollop.robot.performing import distances_to_law, return_times
 from dollop.trajectory import distance_to_polyline, mean_trajectory
 
@@ -18,10 +19,10 @@ CONTROLS = {  # suffix in the metrics: what it is, and how the robot is asked fo
 
 def figure_6b():
     """Subgoals and control law extracted from the demonstrations of Fig. 6a."""
-    recording, observation = experiments.figure_eights(), experiments.figure_eights_observed()
-    law, laps = experiments.figure_eight_task().law, experiments.figure_eight_laps()
+    recording, observation = recordings.figure_eights(), recordings.figure_eights_observed()
+    law, laps = recordings.figure_eight_task().law, recordings.figure_eight_laps()
     figure, ax = plt.subplots(figsize=SIZE)
-    plot.workspace(experiments.background_map(), recording.log.poses[0], observation.environment.boxes, ax)
+    plot.workspace(recordings.background_map(), recording.log.poses[0], observation.environment.boxes, ax)
     for k, lap in enumerate(laps):
         plot.path(ax, lap, "laps" if k == 0 else None, linewidth=0.4, alpha=0.6)
     plot.law(ax, law.response())
@@ -36,18 +37,20 @@ def figure_6b():
 
 
 def figure_7a():
-    """Ten runs of the robot: the paper's kind of law, and beside it the one that respects the robot's dynamics."""
-    task = experiments.figure_eight_task()
+    """Ten runs of the robot: the paper's kind of law, and beside it the one that respects the
+    robot's dynamics.
+    """
+    task = recordings.figure_eight_task()
     figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
     metrics = {}
     titles = {"plain": "plain: points along the response", "pursuit": "pursuit: respects the robot's dynamics"}
-    runs_of = at_once(experiments.eight_runs, [(control,) for control in titles])
+    runs_of = at_once(recordings.eight_runs, [(control,) for control in titles])
     for ax, (control, title), runs in zip(axes, titles.items(), runs_of, strict=True):
         draw_runs(ax, task, runs, title)
         distances = np.concatenate([distances_to_law(run, task.law) for run in runs])
         errors = [pose_errors(run) for run in runs]
         metrics[control] = {
-            **experiments.counts(runs),
+            **recordings.counts(runs),
             "mean_distance_m": distances.mean(),
             "max_distance_m": distances.max(),
             "min_clearance_m": least_clearance(runs),
@@ -59,17 +62,19 @@ def figure_7a():
 
 
 def figure_7b():
-    """Five runs, each kidnapped once: the paper's kind of law, and beside it the same law going round obstacles."""
-    task = experiments.figure_eight_task()
+    """Five runs, each kidnapped once: the paper's kind of law, and beside it the same law going
+    round obstacles.
+    """
+    task = recordings.figure_eight_task()
     figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
     metrics = {}
     titles = {"plain": "plain, obstacles ignored", "aware": "plain, going round obstacles"}
-    runs_of = at_once(experiments.kidnapped_runs, [("plain", False), ("plain", True)])
+    runs_of = at_once(recordings.kidnapped_runs, [("plain", False), ("plain", True)])
     for ax, (name, title), runs in zip(axes, titles.items(), runs_of, strict=True):
         draw_runs(ax, task, runs, title)
         times = np.concatenate([return_times(run, task.law) for run in runs])
         back = times[np.isfinite(times)]
-        metrics[name] = experiments.counts(runs) | {
+        metrics[name] = recordings.counts(runs) | {
             "return_time_s": back.mean() if len(back) else None,
             "min_clearance_m": least_clearance(runs),
         }
@@ -78,13 +83,15 @@ def figure_7b():
 
 
 def at_once(work, arguments):
-    """What `work` returns for each of some arguments, two at a time: the numbers are the same, seeds being fixed."""
+    """What `work` returns for each of some arguments, two at a time: the numbers are the same,
+    seeds being fixed.
+    """
     return joblib.Parallel(n_jobs=2)(joblib.delayed(work)(*each) for each in arguments)
 
 
 def draw_runs(ax, task, runs, title):
     """The law, and the runs of the robot over it."""
-    plot.workspace(experiments.background_map(), None, task.environment.boxes, ax, title)
+    plot.workspace(recordings.background_map(), None, task.environment.boxes, ax, title)
     plot.law(ax, task.law.response())
     plot.runs(ax, runs)
 

@@ -1,7 +1,8 @@
-"""Experiments on learning from several demonstrations (Sec. V): each is a function of a seed that returns its numbers.
+"""Experiments on learning from several demonstrations (Sec. V): each is a function of a seed that
+returns its numbers.
 
-See `dollop.claims` for what is asked of them. Some draw subgoals of a known task, for only there the truth is known;
-others use slaloms that were walked, seen by the laser and segmented.
+See `dollop.replication.claims` for what is asked of them. Some draw subgoals of a known task, for
+only there the truth is known; others use slaloms that were walked, seen by the laser and segmented.
 """
 
 from functools import lru_cache
@@ -10,15 +11,15 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from dollop import experiments
-from dollop.baseline import TASKS, draw_demonstrations, merged
 from dollop.cdhmm import SubgoalHMM
 from dollop.lds import LDS
+from dollop.replication import recordings
+from dollop.replication.baseline import TASKS, draw_demonstrations, merged
+from dollop.replication.claims.performing import run_plainly
 from dollop.robot.performing import Unicycle, perform
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Task, learn, members_along
 from dollop.trajectory import distance_to_polyline
-from dollop.trials_performing import run_plainly
 
 # ---- subgoals of a known task
 
@@ -27,10 +28,12 @@ SPREAD = 0.15
 
 
 def several(seed, numbers=(1, 2, 5, 10)):
-    """Error of the merged subgoals of a slalom from one to ten demonstrations, and how fast it falls.
+    """Error of the merged subgoals of a slalom from one to ten demonstrations, and how fast it
+    falls.
 
-    The same where the learner's model is wrong: subgoals that scatter half or twice as far as it expects, or with
-    heavy tails. And of walked slaloms the passing places that a learned law gets nearer to.
+    The same where the learner's model is wrong: subgoals that scatter half or twice as far as it
+    expects, or with heavy tails. And of walked slaloms the passing places that a learned law gets
+    nearer to.
     """
     truth = np.array(TASKS["slalom"])
     errors = errors_by_number(truth, numbers, lambda n: drawn(truth, n, [seed, n], SPREAD))
@@ -62,19 +65,25 @@ def drawn(truth, n, seed, spread):
 
 
 def drawn_with_tails(truth, n, seed):
-    """The same with the heavy tails of Student's t of three degrees of freedom, its scale being the usual spread."""
+    """The same with the heavy tails of Student's t of three degrees of freedom, its scale being the
+    usual spread.
+    """
     rng = np.random.default_rng(seed)
     exact = draw_demonstrations(truth, n, 0.0, seed=rng)
     return [subgoals + SPREAD * rng.standard_t(3, subgoals.shape) for subgoals in exact]
 
 
 def subgoal_error(found, truth):
-    """Mean distance in m of the found subgoals from the true ones, nan where their number is not right."""
+    """Mean distance in m of the found subgoals from the true ones, nan where their number is not
+    right.
+    """
     return np.linalg.norm(found - truth, axis=1).mean() if len(found) == len(truth) else nan
 
 
 def combined(seed, n=5):
-    """Whether merging five demonstrations leaves the task's states and one for each subgoal that is no part of it."""
+    """Whether merging five demonstrations leaves the task's states and one for each subgoal that is
+    no part of it.
+    """
     truth = np.array(TASKS["slalom"])
     shown = draw_demonstrations(truth, n, SPREAD, seed=[seed, 19])
     model = SubgoalHMM.fit(shown, SPREAD)
@@ -97,23 +106,25 @@ def slaloms(seed):
     Returns
     -------
     SimpleNamespace or None
-        `shown` and `kept` (Demonstration), `both` and `alone` (Task, adapted to the third layout), `scene` of the
-        third; None where the layouts cannot be matched with confidence.
+        `shown` and `kept` (Demonstration), `both` and `alone` (Task, adapted to the third layout),
+        `scene` of the third; None where the layouts cannot be matched with confidence.
     """
-    *shown, kept = (experiments.slalom_demonstration(k, seed) for k in range(3))
+    *shown, kept = (recordings.slalom_demonstration(k, seed) for k in range(3))
     try:
         both = learn(shown).adapt(kept.environment)
         alone = [Task.of(each).adapt(kept.environment) for each in shown]
     except ValueError:  # an ambiguous matching: it asks instead of guessing
         return None
-    scene, _ = experiments.slalom_layout(2, seed)
+    scene, _ = recordings.slalom_layout(2, seed)
     return SimpleNamespace(shown=shown, kept=kept, both=both, alone=alone, scene=scene)
 
 
 def shared(seed):
-    """A slalom learned from two demonstrations, in the layout of a third: how far from what was walked there.
+    """A slalom learned from two demonstrations, in the layout of a third: how far from what was
+    walked there.
 
-    Beside it a task from each demonstration alone; and the same subgoals with LDS of one demonstration, not shared.
+    Beside it a task from each demonstration alone; and the same subgoals with LDS of one
+    demonstration, not shared.
     """
     found = slaloms(seed)
     if found is None:
@@ -128,12 +139,14 @@ def shared(seed):
 
 
 def generalize(seed):
-    """Whether law and robot pass every cone of a third layout on the user's side, and whether the robot touches one."""
+    """Whether law and robot pass every cone of a third layout on the user's side, and whether the
+    robot touches one.
+    """
     found = slaloms(seed)
     if found is None:
         return {"refused": 1.0, "sides_right": nan, "plain_clear": nan, "aware_clear": nan}
-    task, grid = found.both, experiments.background_map()
-    (start,) = experiments.starts_near_the_beginning(task, 1, np.random.default_rng([seed, 20]))
+    task, grid = found.both, recordings.background_map()
+    (start,) = recordings.starts_near_the_beginning(task, 1, np.random.default_rng([seed, 20]))
     runs = {"plain": run_plainly(task, start), "aware": perform(task, Unicycle(start), background=grid)}
     clear = {f"{name}_clear": float(run.finished and not run.collisions) for name, run in runs.items()}
     return {"refused": 0.0, "sides_right": sides_right(task, found.kept), **clear}
@@ -156,12 +169,14 @@ def with_own_lds(task, shown, d):
 def sides_right(task, kept):
     """Whether the law passes every cone on the side on which the user passed it."""
     (walk,) = kept.trajectory
-    law, user = (experiments.passing_sides(path, kept.environment.centres) for path in (task.law.response(), walk))
+    law, user = (recordings.passing_sides(path, kept.environment.centres) for path in (task.law.response(), walk))
     return float(np.array_equal(law, user))
 
 
 def passing_alone_more(seed):
-    """How much nearer a law of two slaloms is to where the user intends to pass the cones than laws of one, in m."""
+    """How much nearer a law of two slaloms is to where the user intends to pass the cones than laws
+    of one, in m.
+    """
     found = slaloms(seed)
     if found is None:
         return nan
@@ -171,7 +186,9 @@ def passing_alone_more(seed):
 
 
 def intended_places(cones, swing=0.75):
-    """Where a walker aims to pass cones (N, 2), in turn left and right of them: `dollop.lab.person.slalom`'s places."""
+    """Where a walker aims to pass cones (N, 2), in turn left and right of them:
+    `dollop.lab.person.slalom`'s places.
+    """
     along = np.gradient(cones, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     left = np.column_stack([-along[:, 1], along[:, 0]])

@@ -5,11 +5,12 @@ from string import ascii_lowercase
 import matplotlib.pyplot as plt
 import numpy as np
 
-from dollop import experiments, plot
+from dollop import plot
 from dollop.environment import Environment, spring_constants, spring_forces
-from dollop.figures_performing import CONTROLS, at_once, draw_runs, least_clearance
-from dollop.layouts import matching_shares
 from dollop.matching import match
+from dollop.replication import recordings
+from dollop.replication.figures.performing import CONTROLS, at_once, draw_runs, least_clearance
+from dollop.replication.layouts import matching_shares
 
 NEAR = 0.11  # m, how far a label stands off its corner in the drawing
 ASIDE = 1.0, -2.2  # m, by which Fig. 8 draws the boxes of now aside, so that no two lines lie on each other
@@ -17,8 +18,10 @@ WIDE = 10  # inches, figures of three panels
 
 
 def figure_8():
-    """Eight corners above, matched to eight below: the paper's literal cost, and the robust matching."""
-    before, after = experiments.figure_eight_task().environment, experiments.moved_environment(0)
+    """Eight corners above, matched to eight below: the paper's literal cost, and the robust
+    matching.
+    """
+    before, after = recordings.figure_eight_task().environment, recordings.moved_environment(0)
     literal, robust = match(before, after, method="literal"), match(before, after)
     aside = Environment(after.boxes + np.tile(ASIDE, 2))
     figure, ax = plt.subplots(figsize=(8, 5.4))
@@ -66,8 +69,10 @@ def label_corners(ax, environment, names, away):
 
 
 def figure_9():
-    """The springs between eight corners, wide where they are strong, and enlarged the force on each corner of a box."""
-    environment = experiments.figure_eight_task().environment
+    """The springs between eight corners, wide where they are strong, and enlarged the force on each
+    corner of a box.
+    """
+    environment = recordings.figure_eight_task().environment
     corners = environment.corners
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.2), width_ratios=(3, 1))
     for ax in (left, right):
@@ -80,7 +85,7 @@ def figure_9():
     right.quiver(*corners.T, *spring_forces(corners).T, color=plot.FORCE, zorder=5, **arrows)
     middle = environment.centres[environment.centres[:, 0].argmin()]
     right.set(xlim=middle[0] + [-0.3, 0.3], ylim=middle[1] + [-0.3, 0.3], title="one box, with the forces", ylabel="")
-    matching = match(environment, experiments.moved_environment(0), method="literal")
+    matching = match(environment, recordings.moved_environment(0), method="literal")
     return figure, {"indices": matching.indices.tolist(), "cost": matching.cost, "margin": matching.margin}
 
 
@@ -95,55 +100,60 @@ def draw_springs(ax, corners):
 
 def figure_10a():
     """Moved obstacles, as the robot's laser sees them, and the subgoals that moved with them."""
-    task, grid = experiments.figure_eight_task(), experiments.background_map()
-    figure, axes = plt.subplots(1, len(experiments.LAYOUTS), figsize=(WIDE, 3), sharey=True)
+    task, grid = recordings.figure_eight_task(), recordings.background_map()
+    figure, axes = plt.subplots(1, len(recordings.LAYOUTS), figsize=(WIDE, 3), sharey=True)
     right = []
     for k, ax in enumerate(axes):
-        adapted = experiments.adapted_task(k)
-        plot.workspace(grid, experiments.moved_scene(k).robot, adapted.environment.boxes, ax, f"layout {k + 1}")
+        adapted = recordings.adapted_task(k)
+        plot.workspace(grid, recordings.moved_scene(k).robot, adapted.environment.boxes, ax, f"layout {k + 1}")
         plot.boxes(ax, task.environment.boxes, "obstacles before", plot.BACKGROUND, linestyle=":", linewidth=1.5)
         plot.law(ax, adapted.law.response())
         ax.plot(*task.law.subgoals.T, "x", color=plot.BACKGROUND, markeredgewidth=1.5, label="subgoals before")
         plot.subgoals(ax, adapted.law.subgoals)
-        right.append(experiments.matched_right(k))
+        right.append(recordings.matched_right(k))
     show_part(axes, (0.2, 5.3))
     plot.legend_below(figure, axes[0])
     return figure, {"matching_right": int(sum(right)), "layouts": len(right)}
 
 
 def show_part(axes, heights):
-    """The middle of the laboratory, between two heights y in m: what lies beyond is blank in every layout."""
+    """The middle of the laboratory, between two heights y in m: what lies beyond is blank in every
+    layout.
+    """
     for ax in axes:
         ax.set(xlim=(0.6, 8.6), ylim=heights)
         ax.label_outer()
 
 
 def figure_10b():
-    """The robot performing the adapted task among moved obstacles: the paper's kind of control, and Dollop's own."""
-    layouts = range(len(experiments.LAYOUTS))
+    """The robot performing the adapted task among moved obstacles: the paper's kind of control, and
+    Dollop's own.
+    """
+    layouts = range(len(recordings.LAYOUTS))
     figure, rows = plt.subplots(2, len(layouts), figsize=(WIDE, 4.9), sharex=True, sharey=True)
     cases = [(k, choices) for _, choices in CONTROLS.values() for k in layouts]
-    runs_of = dict(zip(cases, at_once(experiments.moved_runs, [(k, *choices) for k, choices in cases]), strict=True))
+    runs_of = dict(zip(cases, at_once(recordings.moved_runs, [(k, *choices) for k, choices in cases]), strict=True))
     metrics = {}
     for axes, (suffix, (title, choices)) in zip(rows, CONTROLS.items(), strict=True):
         everything = [runs_of[k, choices] for k in layouts]
         for k, ax in enumerate(axes):
-            draw_runs(ax, experiments.adapted_task(k), everything[k], f"layout {k + 1}")
+            draw_runs(ax, recordings.adapted_task(k), everything[k], f"layout {k + 1}")
         axes[1].set_title(f"{title}\nlayout 2")
         runs = sum(everything, [])
-        numbers = experiments.counts(runs) | {"min_clearance_m": least_clearance(runs)}
+        numbers = recordings.counts(runs) | {"min_clearance_m": least_clearance(runs)}
         metrics = {f"{key}{suffix}": value for key, value in numbers.items()} | metrics
     show_part(rows.flat, (1.3, 5.3))
     plot.legend_below(figure, *rows.flat)
-    return figure, {"matching_right": int(sum(experiments.matched_right(k) for k in layouts))} | metrics
+    return figure, {"matching_right": int(sum(recordings.matched_right(k) for k in layouts))} | metrics
 
 
 def figure_x1():
-    """Beyond the paper: share of layouts with every corner matched right, by method, with boxes ever less exact.
+    """Beyond the paper: share of layouts with every corner matched right, by method, with boxes
+    ever less exact.
 
     Left from boxes drawn at random, right from boxes as the laser sees them.
     """
-    shares = matching_shares(noises=(0.0, 0.025, 0.05, 0.1, 0.15, 0.2), layouts=300, seed=experiments.SEED)
+    shares = matching_shares(noises=(0.0, 0.025, 0.05, 0.1, 0.15, 0.2), layouts=300, seed=recordings.SEED)
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), width_ratios=(2, 1), sharey=True)
     for (method, objects), rows in shares.groupby(["method", "objects"]):
         look = {"color": plot.METHODS[method], "marker": {2: "o", 3: "s", 4: "^"}[objects]}
@@ -151,7 +161,7 @@ def figure_x1():
     left.set(xlabel="box sizes off by up to [m]", ylabel="share of layouts all right", ylim=(0, 1.08))
     left.set_title("random boxes")
     left.legend(ncols=2, loc="center right", bbox_to_anchor=(1.0, 0.68))
-    seen = at_once(experiments.matchings_from_laser, [("cans",), ("cones",)])
+    seen = at_once(recordings.matchings_from_laser, [("cans",), ("cones",)])
     by_laser = dict(zip(("2 cans", "4 cones"), seen, strict=True))
     for k, method in enumerate(("literal", "robust")):
         found = [share[method] for share in by_laser.values()]

@@ -1,20 +1,28 @@
-"""The paper's testable claims, and the experiment behind each: a pure function of a seed that returns numbers.
+"""The paper's testable claims, and the experiment behind each: a pure function of a seed that
+returns numbers.
 
-A claim has one criterion or more: the mean of a number over the seeds, and the range in which the claim wants it; some
-numbers have none and are only told. A criterion is met when the whole 95 % interval lies within its range, and clearly
-not met when it lies wholly beside it. A claim holds if all its criteria are met; it does not hold if none is and one
-clearly is not; otherwise it holds in part.
-
-The experiments are in `dollop.trials_observing`, `trials_performing`, `trials_environment` and `trials_learning`.
+A claim has one criterion or more: the mean of a number over the seeds, and the range in which the
+claim wants it; some numbers have none and are only told. A criterion is met when the whole 95 %
+interval lies within its range, and clearly not met when it lies wholly beside it. A claim holds if
+all its criteria are met; it does not hold if none is and one clearly is not; otherwise it holds in
+part.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
-from dollop.trials_environment import consistent, counted, counterintuitive, matching_time, moved, optimal, single
-from dollop.trials_learning import combined, generalize, several, shared
-from dollop.trials_observing import (
+from dollop.replication.claims.environment import (
+    consistent,
+    counted,
+    counterintuitive,
+    matching_time,
+    moved,
+    optimal,
+    single,
+)
+from dollop.replication.claims.learning import combined, generalize, several, shared
+from dollop.replication.claims.observing import (
     ACCELERATION,
     PREDICTORS,
     VELOCITY,
@@ -27,7 +35,7 @@ from dollop.trials_observing import (
     straight,
     velocity,
 )
-from dollop.trials_performing import (
+from dollop.replication.claims.performing import (
     KIDNAPPINGS,
     figure,
     follow,
@@ -54,13 +62,14 @@ class Criterion:
     meaning : str
         What it is, with its unit.
     wanted : (float, float) or None
-        The claim wants the mean over the seeds in here, the upper end included; None if the number is only told.
+        The claim wants the mean over the seeds in here, the upper end included; None if the number
+        is only told.
     band : (float, float)
-        The mean over a hundred seeds lies in here, or something has changed since the study was made. For n seeds it
-        is wider by the square root of 100 / n.
+        The mean over a hundred seeds lies in here, or something has changed since the study was
+        made. For n seeds it is wider by the square root of 100 / n.
     trials : int
-        The number of a seed is the share of so many trials, 0 if it is no share. The interval of a share of one trial
-        is Wilson's.
+        The number of a seed is the share of so many trials, 0 if it is no share. The interval of a
+        share of one trial is Wilson's.
     timed : bool
         Whether it is a time that something took, which no two runs have in common.
     """
@@ -90,8 +99,8 @@ class Claim:
     setup : str
         What is measured, on what, in a sentence or two.
     constructed : bool
-        Whether the method as reconstructed makes it true or false whatever the data: then the experiment checks the
-        program, and says nothing of the world.
+        Whether the method as reconstructed makes it true or false whatever the data: then the
+        experiment checks the program, and says nothing of the world.
     """
 
     id: str

@@ -1,8 +1,10 @@
-"""The study behind REPLICATION.md: every claim's experiment over many seeds, on all cores or on a Dask cluster.
+"""The study behind REPLICATION.md: every claim's experiment over many seeds, on all cores or on a
+Dask cluster.
 
-Results go into one tidy table, study/results.csv: a row per claim, seed and number. It is replaced whole after every
-seed that is done, so that an interrupted study goes on where it was. From the table come claims.json, and with it the
-table of claims in REPLICATION.md; and study/golden.json, the numbers of one seed that any machine must find again.
+Results go into one tidy table, study/results.csv: a row per claim, seed and number. It is replaced
+whole after every seed that is done, so that an interrupted study goes on where it was. From the
+table come claims.json, and with it the table of claims in REPLICATION.md; and study/golden.json,
+the numbers of one seed that any machine must find again.
 """
 
 import json
@@ -18,8 +20,8 @@ import pandas as pd
 from scipy import stats
 from tqdm import tqdm
 
-from dollop.claims import CLAIMS
 from dollop.formats.files import FormatError, whole_file
+from dollop.replication.claims import CLAIMS
 
 COLUMNS = ["claim", "seed", "number", "value"]
 SEEDS, QUICK_SEEDS = 100, 3
@@ -27,10 +29,14 @@ ATTEMPTS = 3
 """How often in a row workers may die without a seed being finished before the study gives up."""
 
 PATIENCE = 300.0
-"""On a cluster, after so many s without a seed finished a worker counts as dead: joblib's Dask backend is silent."""
+"""On a cluster, after so many s without a seed finished a worker counts as dead: joblib's Dask
+backend is silent.
+"""
 
 GOLDEN = {"seed": 0, "relative_tolerance": 0.02, "absolute_tolerance": 0.001}
-"""Another machine must find the numbers of this seed within these: linear algebra differs in the last digits."""
+"""Another machine must find the numbers of this seed within these: linear algebra differs in the
+last digits.
+"""
 
 BEGIN, END = "<!-- claims: begin -->", "<!-- claims: end -->"
 
@@ -126,7 +132,9 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
 
 @contextmanager
 def workers(scheduler=None, jobs=-1):
-    """What runs jobs and yields their results as they come: processes here, or those of a Dask cluster."""
+    """What runs jobs and yields their results as they come: processes here, or those of a Dask
+    cluster.
+    """
     with dask_backend(scheduler) if scheduler else nullcontext():
         patience = PATIENCE if scheduler else None
         yield joblib.Parallel(jobs, return_as="generator_unordered", batch_size=1, timeout=patience)
@@ -233,7 +241,9 @@ def summary(claim, rows):
 
 
 def measured(criterion, values):
-    """One number over the seeds: mean, interval, what is wanted, whether that is met, and the band; open ends None."""
+    """One number over the seeds: mean, interval, what is wanted, whether that is met, and the band;
+    open ends None.
+    """
     mean, low, high = interval(values, criterion.trials == 1)
     wanted = criterion.wanted
     return {
@@ -260,14 +270,18 @@ def closed(range_):
 
 
 def met(low, high, wanted):
-    """Whether an interval lies in what is wanted: "yes", "no" if it lies wholly beside it, else "open"."""
+    """Whether an interval lies in what is wanted: "yes", "no" if it lies wholly beside it, else
+    "open".
+    """
     if wanted[0] < low and high <= wanted[1]:
         return "yes"
     return "no" if high <= wanted[0] or low > wanted[1] else "open"
 
 
 def verdict(answers):
-    """The rule: it holds if every criterion is met, and does not if none is and one is clearly not; else in part."""
+    """The rule: it holds if every criterion is met, and does not if none is and one is clearly not;
+    else in part.
+    """
     if all(answer == "yes" for answer in answers):
         return "holds"
     return "does not hold" if "no" in answers and "yes" not in answers else "holds in part"
@@ -279,7 +293,9 @@ def summaries(table):
 
 
 def claims_table(found):
-    """The claims as a Markdown table: the words, the numbers with 95 % intervals, what is wanted, the verdict."""
+    """The claims as a Markdown table: the words, the numbers with 95 % intervals, what is wanted,
+    the verdict.
+    """
     lines = ["| claim | Sec. | the paper's words | number: mean [95 % interval] | wanted | verdict |", "|" + "---|" * 6]
     for claim in found:
         numbers = "<br>".join(f"{n['meaning']}: {amount(n)}" for n in claim["numbers"])
@@ -291,7 +307,9 @@ def claims_table(found):
 
 
 def golden_numbers(table):
-    """The numbers of the golden seed by claim, None for nan, times left out; with the seed and the tolerances."""
+    """The numbers of the golden seed by claim, None for nan, times left out; with the seed and the
+    tolerances.
+    """
     rows = table[table.seed == GOLDEN["seed"]].set_index(["claim", "number"]).value
     numbers = {
         id: {
@@ -373,7 +391,8 @@ def check_writable(folder):
 
 
 def report(found, table, folder):
-    """Write claims.json: into a quick study's folder, or beside REPLICATION.md, whose table of claims it then is.
+    """Write claims.json: into a quick study's folder, or beside REPLICATION.md, whose table of
+    claims it then is.
 
     Beside REPLICATION.md, the golden numbers are written as well.
     """
