@@ -45,11 +45,11 @@ def timed(name, times_real, make_robot, task, control, background, repeats=5):
 
 def timed_in_lab(scene, task, background):
     """A row for the Pioneer in PyBullet with its laser and its localisation."""
-    from dollop.lab.robot import LocalisedPioneer
+    from dollop.lab.pioneer import Pioneer
     from dollop.lab.world import World
 
     with World(scene) as world:
-        robot = LocalisedPioneer(world, background, START, task.environment, seed=0)
+        robot = Pioneer(world, START, background, task.environment, seed=0)
 
         def back_at_start():
             robot.place(START)

@@ -16,7 +16,6 @@ NEEDS_PYBULLET = {
     "World": "world",
     "SickLMS200": "sick",
     "Pioneer": "pioneer",
-    "LocalisedPioneer": "robot",
     "record": "simulate",
     "record_figure_eights": "simulate",
     "record_background": "simulate",

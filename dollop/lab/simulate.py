@@ -10,7 +10,7 @@ from dollop.lab.scenes import empty_scene, figure_eight_scene
 from dollop.lab.sick import SickLMS200
 from dollop.lab.world import World
 from dollop.laser import LaserLog
-from dollop.robot.control import wrap
+from dollop.robot.control import PIONEER_LIMITS, wrap
 
 TOUR = (
     (4.5, 2.6),
@@ -26,6 +26,8 @@ TOUR = (
     (4.5, 3.6),
 )
 """Way-points in m of the drive that shows the laser every side of the background."""
+TOUR_LIMITS = PIONEER_LIMITS._replace(turn=1.75)
+"""On that drive the robot may turn as fast as it can: 100 deg/s (Player, p2os)."""
 
 
 def record(scene, walk, seed, sick=None, legs=False):
@@ -125,13 +127,12 @@ def record_background(seed, sick=None):
     scene = empty_scene()
     poses, ranges = [], []
     with World(scene) as world:
-        robot = Pioneer(world, scene.robot)
+        robot = Pioneer(world, scene.robot, limits=TOUR_LIMITS, sick=sick)
         for goal in np.asarray(TOUR):
             while np.linalg.norm(goal - robot.pose[:2]) > 0.3:
                 poses.append(laser_pose(robot.pose))
                 ranges.append(sick.scan(world, poses[-1], rng))
                 robot.drive(*pursue(robot.pose, goal))
-                robot.advance(1 / sick.rate)
     t = np.arange(len(poses)) / sick.rate
     return LaserLog(t, np.array(ranges), sick.angles, np.array(poses), sick.max_range)
 

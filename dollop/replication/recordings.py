@@ -215,10 +215,10 @@ def run_in_lab(task, scene, start, seed, **choices):
     """One run of the simulated Pioneer, which localises itself with its laser, in a scene of the
     laboratory.
     """
-    from dollop.lab import LocalisedPioneer, World
+    from dollop.lab import Pioneer, World
 
     with World(scene) as world:
-        robot = LocalisedPioneer(world, background_map(), start, task.environment, seed)
+        robot = Pioneer(world, start, background_map(), task.environment, seed)
         return perform(task, robot, background=background_map(), **choices)
 
 

@@ -3,7 +3,7 @@
 A robot is anything with `pose` (x, y in m, theta in rad: what it believes), `localised` (whether it
 trusts its belief), `limits`, `period` in s, and `drive(v, omega)`, which lets one period pass. One
 that can feel what it touches has `touching`; a simulated one has `true_pose`, for measuring, and
-`place(pose)`, which kidnaps it. Here is a fast one for studies; `dollop.lab.robot` has the Pioneer.
+`place(pose)`, which kidnaps it. Here is a fast one for studies; `dollop.lab` has the Pioneer.
 """
 
 from dataclasses import dataclass
@@ -132,7 +132,7 @@ def perform(
     ----------
     task : Task
         Anything with a `law` (SequencedLDS) and an `environment` (Environment).
-    robot : Unicycle, LocalisedPioneer, or one of your own
+    robot : Unicycle, dollop.lab.Pioneer, or one of your own
         See the top of `dollop.robot.performing`. Where it stands is where it starts. It drives
         until the task is finished or given up.
     control : str

@@ -11,7 +11,7 @@ from rooms import figure_eight
 
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
-from dollop.lab.robot import LocalisedPioneer
+from dollop.lab.pioneer import Pioneer
 from dollop.lab.scenes import BACKGROUND, BEAM_HEIGHT, ROOM, figure_eight_scene
 from dollop.lab.world import World
 from dollop.robot.performing import perform
@@ -37,7 +37,7 @@ def task():
 
 def run_in_lab(task, background, **keywords):
     with World(figure_eight_scene()) as world:
-        robot = LocalisedPioneer(world, background, START, task.environment, seed=0)
+        robot = Pioneer(world, START, background, task.environment, seed=0)
         return perform(task, robot, background=background, **keywords)
 
 
@@ -69,7 +69,7 @@ def test_kidnapped_it_stops_finds_itself_and_goes_on(task, background):
 def test_a_start_it_is_not_told(task, background):
     """Not told where it starts, it turns until it knows."""
     with World(figure_eight_scene()) as world:
-        robot = LocalisedPioneer(world, background, START, task.environment, seed=1, knows_start=False)
+        robot = Pioneer(world, START, background, task.environment, seed=1, knows_start=False)
         assert np.isfinite(robot.pose).all() and not robot.localised
         for _ in range(100):
             robot.drive(0.0, 0.5)
@@ -80,7 +80,7 @@ def test_a_start_it_is_not_told(task, background):
 def test_it_feels_what_it_touches(background):
     """Driven against a can, it touches; standing free, it does not."""
     with World(figure_eight_scene()) as world:
-        robot = LocalisedPioneer(world, background, (3.3, 3.6, np.pi), seed=0)
+        robot = Pioneer(world, (3.3, 3.6, np.pi), background, seed=0)
         assert not robot.touching
         for _ in range(30):
             robot.drive(0.3, 0.0)
