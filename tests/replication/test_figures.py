@@ -3,12 +3,21 @@
 import json
 import sys
 
+import numpy as np
 import pytest
 from places import ROOT
 
-from dollop.replication import figures
+from dollop.replication import baseline, figures, recordings
+from dollop.replication.layouts import matching_shares
+from dollop.robot.performing import distances_to_law
 
 COMMITTED = json.loads((ROOT / "figures" / "metrics.json").read_text())
+
+
+@pytest.fixture
+def lab():
+    """Skip where there is no laboratory to simulate in."""
+    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
 
 
 def test_every_panel_is_committed():
@@ -104,3 +113,64 @@ def test_a_folder_that_cannot_be_made_is_said_before_the_work(tmp_path, capsys):
     with pytest.raises(SystemExit):
         figures.main(["6b", "--folder", str(tmp_path / "taken")])
     assert "taken" in capsys.readouterr().err
+
+
+# ---- the figures whose numbers take long, made anew with fewer runs and seeds
+
+
+@pytest.mark.usefixtures("lab")
+def test_fresh_runs_are_as_near_to_the_law_as_in_figure_7a():
+    """Two of its runs: finished, nothing touched, as near to the response on average within 15 mm."""
+    law = recordings.figure_eight_task().law
+    for control, end in (("plain", ""), ("pursuit", "_pursuit")):
+        runs = recordings.eight_runs(control, count=2)
+        assert recordings.counts(runs) == {"runs": 2, "finished": 2, "collisions": 0, "runs_with_collision": 0}
+        distance = np.mean([distances_to_law(run, law).mean() for run in runs])
+        assert distance == pytest.approx(COMMITTED["7a"][f"mean_distance_m{end}"], abs=0.015)
+
+
+@pytest.mark.usefixtures("lab")
+def test_a_fresh_kidnapped_run_goes_round_obstacles_as_in_figure_7b():
+    """One of its kind: it finds itself again, finishes and touches nothing."""
+    (run,) = recordings.kidnapped_runs("plain", True, count=1)
+    assert run.finished and not run.collisions and len(run.kidnapped) == 1 and not run.localised.all()
+
+
+@pytest.mark.usefixtures("lab")
+def test_fresh_runs_among_moved_cans_finish_as_in_figure_10b():
+    """One run in a layout: finished, nothing touched, no nearer than the figure's nearest within 10 cm."""
+    (run,) = recordings.moved_runs(0, count=1)
+    assert run.finished and not run.collisions
+    assert run.clearance.min() > COMMITTED["10b"]["min_clearance_m"] - 0.1
+
+
+@pytest.mark.usefixtures("lab")
+def test_fresh_runs_of_the_slalom_pass_the_cones_as_in_figure_12b():
+    """Two runs: finished, nothing touched, every cone on the demonstrated side."""
+    task, shown = recordings.new_slalom_task(), recordings.slalom_demonstration(0)
+    sides = recordings.passing_sides(shown.law.response(), shown.environment.centres)
+    runs = recordings.slalom_runs(count=2)
+    assert [run.finished and not run.collisions for run in runs] == [True, True]
+    assert all(recordings.same_sides(run, task, sides) for run in runs)
+
+
+@pytest.mark.usefixtures("lab")
+def test_fresh_layouts_are_matched_as_often_as_in_figure_x1():
+    """Of sixty layouts of each number of objects about the committed share, both methods; of ten seen by the laser."""
+    for row in matching_shares(noises=(0.05,), layouts=60, seed=1).itertuples():
+        assert row.right == pytest.approx(COMMITTED["x1"][f"{row.objects}_objects_{row.method}"], abs=0.2)
+    for kind in ("cans", "cones"):
+        for method, share in recordings.matchings_from_laser(kind, count=10).items():
+            assert share == pytest.approx(COMMITTED["x1"][f"{kind}_seen_{method}"], abs=0.4)
+
+
+def test_fresh_demonstrations_are_merged_as_well_as_in_figure_x2():
+    """Ten seeds: merging finds number and order and is as near within a quarter; the others as often within a third."""
+    ten = baseline.summary(baseline.study(("slalom",), (2, 5), (0.15,), range(100, 110), ("merging", "plain mean")))
+    for n in (2, 5):
+        merging, mean = (ten.loc[("slalom", 0.15, n, method)] for method in ("merging", "plain mean"))
+        assert merging.right_order >= 0.9
+        assert merging.error == pytest.approx(COMMITTED["x2"][f"error_m_{n}_merging"], rel=0.25)
+        assert mean.right_order == pytest.approx(COMMITTED["x2"][f"right_{n}_mean"], abs=0.34)
+    one = baseline.study(("slalom",), (2,), (0.15,), (0,), ("HMM, BIC",))
+    assert COMMITTED["x2"]["right_2_hmm"] == pytest.approx(one.right_order.mean(), abs=0.67)
