@@ -1,180 +1,11 @@
-"""The gallery: every panel with its caption, what to look at, and its numbers, as one page of
-Markdown.
+"""The gallery: every panel with its caption, what to look at, and its numbers, as one page.
 
-Captions carry no measured numbers: those come from metrics.json, so that they cannot drift apart.
+Captions and looks stand with the drawings (`dollop.replication.figures`); here are the words and
+units of the numbers. Captions carry no measured numbers: those come from metrics.json, so
+that they cannot drift apart.
 """
 
-from dataclasses import dataclass
-
-
-@dataclass(frozen=True)
-class Panel:
-    """What is written beside a panel.
-
-    Attributes
-    ----------
-    caption : str
-        What it shows, after the paper's caption.
-    look : str
-        What to look at, and what to make of it.
-    columns : dict
-        Where the numbers are of several things: how their names end in metrics.json, and what each
-        thing is.
-    """
-
-    caption: str
-    look: str
-    columns: dict
-
-
-def panel(caption, look, **columns):
-    """A Panel; `plain="..."` is a column of numbers whose names end in _plain, `own="..."` of those
-    that do not.
-    """
-    return Panel(caption, look, {"" if end == "own" else f"_{end}": words for end, words in columns.items()})
-
-
-PANELS = {
-    "1": panel(
-        "The mobile robot used in these experiments, Agent Orange.",
-        "A Pioneer 2 DX with its real dimensions: two driven wheels, a castor, and the SICK on top. The paper has "
-        "a photograph; this is the model that the simulation drives.",
-    ),
-    "2": panel(
-        "Conceptual flow diagram of Dollop.",
-        "Bold is the paper's word for a stage, under it the function that does it and the record that it returns. "
-        "What stands in the left frame happens once per demonstration; the right one brings all demonstrations "
-        "together. No arrow points back.",
-    ),
-    "3": panel(
-        "Sample laser scan.",
-        "The robot sits at the bottom. Every dot is where a beam ended; behind each can and behind the user lies "
-        "a shadow. Nothing in the scan says which dots are a person.",
-    ),
-    "4": panel(
-        "Flow diagram for observing the user.",
-        "Every stage with its own intermediate picture. The background map explains walls and desks (grey dots); "
-        "what is left are foreground cells (blue). They go two ways. A quick foreground grid follows the user: the "
-        "darker a cell, the more often it was hit of late; its blobs are the foreground objects, each with its "
-        "centroid (plus), and tracking these tells the user (blue) from what stands still. A second, slower grid "
-        "forgets the user and keeps the static objects. The two stages of the slower grid are drawn after the whole "
-        "recording, all others at one moment of it.",
-    ),
-    "5": panel(
-        "Example setup of the laboratory with two obstacles in the workspace.",
-        "Two trash cans about four metres apart among desks and stools; the robot watches from the wall.",
-    ),
-    "6a": panel(
-        "The track of the user during five demonstrations of a figure-eight.",
-        "Orange dots are Kalman predictions, made while the user was out of sight behind a can. The bias is no "
-        "error of tracking: a laser sees only the near side of a body. The track error is what remains without "
-        "it.",
-    ),
-    "6b": panel(
-        "The subgoals and control law extracted from the demonstrations.",
-        "Crosses are subgoals, where one LDS hands over to the next; the green line is the response of the "
-        "sequenced LDS started where the laps start, the arrowheads say which way it is walked. At some subgoals it "
-        "has a corner: each segment is fitted without regard to the next, and its response arrives along the "
-        "direction in which it is slowest. The paper: 6 LDS, 20 mm on average.",
-    ),
-    "7a": panel(
-        "Ten runs of Agent Orange performing the estimated trajectory of Figure 6b.",
-        "Left the paper's kind of law, which points along the response and knows nothing of wheels, so that the "
-        "robot swings wide in the curves; right the one that respects the robot's dynamics. The fan is the starts, "
-        "each a little off. Distances are from the robot to the response from where that run started, not to the "
-        "green line, which starts where the laps do.",
-        own="plain law",
-        pursuit="pursuit",
-    ),
-    "7b": panel(
-        "The response of Agent Orange after being kidnapped.",
-        "Five runs, a shade and dashes each. A dotted line leads to where the robot was carried, and the number "
-        "there is the run's, the same left and right. The plain law heads for the active subgoal through whatever "
-        "is in the way, and the circle is the robot where that first ends in a contact; that the paper's robot hit "
-        "nothing was, as it says, a coincidence. Right the same law, which now goes round obstacles: nothing else "
-        "differs. One run may touch an obstacle several times, so contacts and runs with a contact are counted "
-        "apart. Time to return: until the robot is within ten centimetres of the response from its start and stays "
-        "there for a second.",
-        own="plain law",
-        aware="plain law, going round obstacles",
-    ),
-    "8": panel(
-        "The eight objects on the left must be matched to those on the right.",
-        "Here the left ones are above and the right ones below, drawn aside so that every line can be told apart. "
-        "The robust matching keeps each box together. The literal cost's lines cross between boxes: forces within "
-        "one box outweigh those between boxes, so errors of a few centimetres in a box decide. Corners count from "
-        "zero in the numbers: for 1 to 8, in this order, which of a (0) to h (7) it goes to. The two costs have "
-        "different units; the margin says how far behind the second-best matching is.",
-        own="robust",
-        literal="literal",
-    ),
-    "9": panel(
-        "Intuitive representation of the spring optimisation.",
-        "Line width grows with the logarithm of the spring constant; arrows are forces. The short springs within a "
-        "box dwarf all others, and each force points into its own box as if there were no second one: this is why "
-        "the literal matching hangs on the boxes' sizes. The numbers are what these springs lead to: the literal "
-        "matching of Figure 8.",
-    ),
-    "10a": panel(
-        "Performing the task of Figure 6b in modified environments: the subgoals.",
-        "Grey dotted boxes and grey crosses: before; solid boxes and black crosses: now. The robot found the moved "
-        "cans with its own laser. The figure-eight still goes round both.",
-    ),
-    "10b": panel(
-        "Performing the task of Figure 6b in modified environments: the robot's runs.",
-        "Purple lines are runs of the simulated robot; the fan is their starts, each a little off. Above the paper's "
-        "kind of control, below Dollop's own, from the same starts: it follows the law more closely, and leaves it "
-        "only where it is near a can. Clearance is from the robot's rim to the nearest obstacle.",
-        plain="plain, obstacles ignored",
-        own="pursuit, going round obstacles",
-    ),
-    "11a": panel(
-        "The first demonstration of a task, its subgoals and control law.",
-        "A slalom past four cones, as tracked by the laser (thin line), and the law that was made of it (wide line).",
-    ),
-    "11b": panel(
-        "The second demonstration, in a different environment.",
-        "The same cones, elsewhere: the walk passes each on the same side as before.",
-    ),
-    "12a": panel(
-        "The CDHMM estimated from the demonstrations of Figure 11, with the most-likely path.",
-        "Both demonstrations were mapped to the first one's environment (dots and triangles); then states that the "
-        "evidence cannot tell apart were merged. An ellipse is two standard deviations of where a state's subgoal "
-        "is expected. With two demonstrations that is nearly all prior: the model starts from the spread below, and "
-        "the two subgoals of a state change it little.",
-    ),
-    "12b": panel(
-        "The result after mapping the subgoals to a new environment.",
-        "Nobody ever walked among these cones; the fan is the starts of ten runs, the same above and below. Above "
-        "the paper's kind of control: the plain law, which knows of no obstacle. It touches a cone, backs off and "
-        "gets round it: past the third cone the law leaves less room than the robot needs, for a law is a line, and "
-        "moved subgoals do not keep every distance. Below Dollop's own: it goes round what is in the "
-        "way, and that alone is why nothing is touched. The circles are the robot where it first touches something.",
-        plain="plain, obstacles ignored",
-        own="pursuit, going round obstacles",
-    ),
-    "x1": panel(
-        "Beyond the paper: how matching fares when box sizes are uncertain.",
-        "Left, objects drawn at random, each moved, and seen with box sizes off by up to so much; the numbers are "
-        "at 5 cm. The literal cost loses its way as soon as boxes are not exact. Right, cans and cones that the "
-        "simulated laser sees, each layout matched to the first: a laser sees one side of a can and is off by "
-        "some centimetres.",
-        literal="literal",
-        robust="robust",
-    ),
-    "x2": panel(
-        "Beyond the paper: learning a task from more and more demonstrations.",
-        "Left, how often a method finds the right subgoals in the right order, bars being 95 % intervals; right, "
-        "how far off they are where their number is right. Dotted is the error to be expected of the mean of so "
-        "many subgoals, which falls as one over the root of their number; merging, which has no more to go by, "
-        "should lie on it, and lies a little to one side by chance, as these seeds drew. The two hidden Markov "
-        "models take far longer and get fewer seeds.",
-        merging="merging",
-        mean="plain mean",
-        hmm="HMM, BIC",
-        left_to_right="left-to-right HMM, BIC",
-    ),
-}
+__all__ = ["NAMES", "page"]
 
 NAMES = {  # name in metrics.json, without the end that says of what: words, and the unit
     "beams": ("beams", ""),
@@ -229,34 +60,38 @@ that begin with x are not in the paper.
 """
 
 
-def page(metrics, picture_of):
+def page(panels, metrics):
     """The gallery as Markdown.
 
     Parameters
     ----------
+    panels : iterable of Panel
+        In the order of the page.
     metrics : dict
         Numbers by panel id, as in metrics.json; panels without an entry are left out.
-    picture_of : callable
-        From a panel id to the name of its picture.
 
     Returns
     -------
     str
+
+    Raises
+    ------
+    KeyError
+        A number that nobody has named in words.
     """
-    shown = [name for name in PANELS if name in metrics]
-    return "\n".join([HEAD, *(section(name, metrics[name], picture_of(name)) for name in shown)])
+    shown = [panel for panel in panels if panel.id in metrics]
+    return "\n".join([HEAD, *(section(panel, metrics[panel.id]) for panel in shown)])
 
 
-def section(name, numbers, picture):
+def section(panel, numbers):
     """One panel: heading, picture, what to look at, numbers."""
-    words = PANELS[name]
     parts = [
-        f"## Figure {name}",
-        f"*{words.caption}*",
-        f"![Figure {name}: {words.caption}]({picture})",
-        f"**What to look at.** {words.look}",
+        f"## Figure {panel.id}",
+        f"*{panel.caption}*",
+        f"![Figure {panel.id}: {panel.caption}]({panel.picture})",
+        f"**What to look at.** {panel.look}",
     ]
-    return "\n\n".join(parts + ([table(numbers, words.columns)] if numbers else [])) + "\n"
+    return "\n\n".join(parts + ([table(numbers, panel.columns)] if numbers else [])) + "\n"
 
 
 def table(numbers, columns):

@@ -23,9 +23,9 @@ def lab():
 def test_every_panel_is_committed():
     """Each figure has its picture and its entry in metrics.json."""
     folder = ROOT / "figures"
-    for panel in figures.FIGURES:
-        assert panel in COMMITTED
-        assert (folder / figures.name_of(panel)).stat().st_size > 5_000
+    for panel in figures.FIGURES.values():
+        assert panel.id in COMMITTED
+        assert (folder / panel.picture).stat().st_size > 5_000
 
 
 @pytest.mark.parametrize("panel", ["3", "6a", "6b", "8", "10a", "11a", "12a"])
@@ -36,7 +36,7 @@ def test_fresh_numbers_equal_the_committed_ones(panel, tmp_path):
     assert fresh.keys() == committed.keys()
     for key, value in committed.items():
         assert fresh[key] == pytest.approx(value, rel=0.02), key
-    assert (tmp_path / figures.name_of(panel)).exists()
+    assert (tmp_path / figures.FIGURES[panel].picture).exists()
 
 
 def test_the_same_figure_twice_is_the_same_file(tmp_path):

@@ -6,39 +6,42 @@ import pytest
 from places import ROOT
 
 from dollop.replication import figures, gallery
+from dollop.replication.figures import FIGURES
 
 FOLDER = ROOT / "figures"
 METRICS = json.loads((FOLDER / "metrics.json").read_text())
 
 
-def test_every_figure_is_in_the_gallery_in_the_same_order():
-    """A figure without a caption cannot be added."""
-    assert list(gallery.PANELS) == list(figures.FIGURES)
+def test_every_panel_has_a_caption_and_a_look_in_the_papers_order():
+    """What a drawing's docstring says is on the page; the names are in the order of metrics.json."""
+    assert list(FIGURES) == list(METRICS)
+    for panel in FIGURES.values():
+        assert panel.caption.endswith(".") and panel.look.endswith("."), panel.id
 
 
 def test_the_committed_page_carries_the_committed_numbers():
     """figures/README.md is what metrics.json and the captions make: numbers never drift."""
-    assert (FOLDER / "README.md").read_text() == gallery.page(METRICS, figures.name_of)
+    assert (FOLDER / "README.md").read_text() == gallery.page(FIGURES.values(), METRICS)
 
 
 def test_every_picture_on_the_page_exists():
     """No link of the gallery is broken."""
-    page = gallery.page(METRICS, figures.name_of)
-    for panel in METRICS:
-        assert f"]({figures.name_of(panel)})" in page
-        assert (FOLDER / figures.name_of(panel)).exists()
+    page = gallery.page(FIGURES.values(), METRICS)
+    for panel in FIGURES.values():
+        assert f"]({panel.picture})" in page
+        assert (FOLDER / panel.picture).exists()
 
 
 def test_captions_carry_no_measured_numbers():
     """A length in millimetres beside a panel comes from metrics.json, save for what the paper itself reports."""
-    for panel, words in gallery.PANELS.items():
-        text = words.caption + words.look.replace("The paper: 6 LDS, 20 mm on average.", "")
-        assert " mm" not in text, panel
+    for panel in FIGURES.values():
+        text = panel.caption + panel.look.replace("The paper: 6 LDS, 20 mm on average.", "")
+        assert " mm" not in text, panel.id
 
 
 def test_panels_without_numbers_are_left_out():
     """Made alone, one figure gives a gallery of one."""
-    page = gallery.page({"6b": {"mean_error_m": 0.013}}, figures.name_of)
+    page = gallery.page(FIGURES.values(), {"6b": {"mean_error_m": 0.013}})
     assert page.count("## Figure") == 1
     assert "| mean error of the law | 13 mm |" in page
 
@@ -67,24 +70,24 @@ def test_every_number_has_words_and_the_unit_that_its_name_ends_in():
     units = {"m": "m", "s": "s", "deg": "°"}
     for panel, numbers in METRICS.items():
         for key in numbers:
-            name, _ = gallery.parted(key, gallery.PANELS[panel].columns)
+            name, _ = gallery.parted(key, FIGURES[panel].columns)
             said = [units[word] for word in name.split("_")[1:] if word in units]
             assert said == [unit for unit in [gallery.NAMES[name][1]] if unit], key
 
 
 def test_no_words_are_for_nothing():
     """Every name is that of a number, every column has numbers, and no two names read alike."""
-    parts = [gallery.parted(key, gallery.PANELS[p].columns) for p, numbers in METRICS.items() for key in numbers]
+    parts = [gallery.parted(key, FIGURES[p].columns) for p, numbers in METRICS.items() for key in numbers]
     assert {name for name, _ in parts} == set(gallery.NAMES)
-    for panel, words in gallery.PANELS.items():
-        assert set(words.columns) <= {gallery.parted(key, words.columns)[1] for key in METRICS[panel]}, panel
+    for panel in FIGURES.values():
+        assert set(panel.columns) <= {gallery.parted(key, panel.columns)[1] for key in METRICS[panel.id]}, panel.id
     assert len({words for words, _ in gallery.NAMES.values()}) == len(gallery.NAMES)
 
 
 def test_a_number_without_words_is_refused():
     """The page is not made with a bare key in it."""
     with pytest.raises(KeyError, match="no words for the number 'bumps'"):
-        gallery.page({"7a": {"bumps": 3}}, figures.name_of)
+        gallery.page(FIGURES.values(), {"7a": {"bumps": 3}})
 
 
 def test_main_writes_the_gallery_beside_the_pictures(tmp_path, monkeypatch):

@@ -16,35 +16,13 @@ from tqdm import tqdm
 from dollop import plot
 from dollop.formats.files import check_writable, whole_file
 from dollop.replication import gallery
-from dollop.replication.figures import environment, learning, observing, performing
+from dollop.replication.figures import environment, learning, observing, performing  # noqa: F401, they register
+from dollop.replication.figures.panel import PANELS
 
-FIGURES = {
-    "1": observing.figure_1,
-    "2": observing.figure_2,
-    "3": observing.figure_3,
-    "4": observing.figure_4,
-    "5": observing.figure_5,
-    "6a": observing.figure_6a,
-    "6b": performing.figure_6b,
-    "7a": performing.figure_7a,
-    "7b": performing.figure_7b,
-    "8": environment.figure_8,
-    "9": environment.figure_9,
-    "10a": environment.figure_10a,
-    "10b": environment.figure_10b,
-    "11a": learning.figure_11a,
-    "11b": learning.figure_11b,
-    "12a": learning.figure_12a,
-    "12b": learning.figure_12b,
-    "x1": environment.figure_x1,
-    "x2": learning.figure_x2,
-}
+__all__ = ["FIGURES", "main", "make"]
 
-
-def name_of(panel):
-    """File name of a panel: "6a" -> "fig_06a.png"."""
-    number = panel.rstrip("ab")
-    return f"fig_{number.zfill(2)}{panel[len(number) :]}.png"
+FIGURES = {each.id: each for each in sorted(PANELS.values(), key=lambda each: each.picture)}
+"""Every panel by id, in the paper's order."""
 
 
 def rounded(metrics):
@@ -52,11 +30,25 @@ def rounded(metrics):
     return {key: round(value, 6) if isinstance(value, float) else value for key, value in metrics.items()}
 
 
-def make(panel, folder):
-    """Draw one panel into `folder`; returns its numbers."""
+def make(id, folder):
+    """Draw one panel.
+
+    Parameters
+    ----------
+    id : str
+        A key of `FIGURES`.
+    folder : Path
+        Where its picture is written.
+
+    Returns
+    -------
+    dict
+        Its numbers, as in metrics.json.
+    """
+    panel = FIGURES[id]
     with plot.style():
-        figure, metrics = FIGURES[panel]()
-        with whole_file(folder / name_of(panel)) as stream:
+        figure, metrics = panel.draw()
+        with whole_file(folder / panel.picture) as stream:
             figure.savefig(stream, format="png", metadata={"Software": None})
         plt.close(figure)
     return rounded(json.loads(json.dumps(metrics, default=float)))
@@ -89,7 +81,7 @@ def main(arguments=None):
         json.dump(metrics, stream, indent=1)
         stream.write("\n")
     with whole_file(options.folder / "README.md", "w") as stream:
-        stream.write(gallery.page(metrics, name_of))
+        stream.write(gallery.page(FIGURES.values(), metrics))
     print(f"wrote {len(panels)} panels, metrics.json and the gallery README.md into {options.folder}/")
 
 

@@ -9,6 +9,7 @@ from dollop import plot
 from dollop.environment import Environment, spring_constants, spring_forces
 from dollop.matching import match
 from dollop.replication import recordings
+from dollop.replication.figures.panel import panel
 from dollop.replication.figures.performing import CONTROLS, at_once, draw_runs, least_clearance
 from dollop.replication.layouts import matching_shares
 
@@ -17,9 +18,16 @@ ASIDE = 1.0, -2.2  # m, by which Fig. 8 draws the boxes of now aside, so that no
 WIDE = 10  # inches, figures of three panels
 
 
+@panel("8", own="robust", literal="literal")
 def figure_8():
-    """Eight corners above, matched to eight below: the paper's literal cost, and the robust
-    matching.
+    """The eight objects on the left must be matched to those on the right.
+
+    Here the left ones are above and the right ones below, drawn aside so that every line can be
+    told apart. The robust matching keeps each box together. The literal cost's lines cross between
+    boxes: forces within one box outweigh those between boxes, so errors of a few centimetres in a
+    box decide. Corners count from zero in the numbers: for 1 to 8, in this order, which of a (0) to
+    h (7) it goes to. The two costs have different units; the margin says how far behind the
+    second-best matching is.
     """
     before, after = recordings.figure_eight_task().environment, recordings.moved_environment(0)
     literal, robust = match(before, after, method="literal"), match(before, after)
@@ -68,9 +76,14 @@ def label_corners(ax, environment, names, away):
     ax.plot(*environment.corners.T, "o", color="black", markersize=4, zorder=6)
 
 
+@panel("9")
 def figure_9():
-    """The springs between eight corners, wide where they are strong, and enlarged the force on each
-    corner of a box.
+    """Intuitive representation of the spring optimisation.
+
+    Line width grows with the logarithm of the spring constant; arrows are forces. The short springs
+    within a box dwarf all others, and each force points into its own box as if there were no second
+    one: this is why the literal matching hangs on the boxes' sizes. The numbers are what these
+    springs lead to: the literal matching of Figure 8.
     """
     environment = recordings.figure_eight_task().environment
     corners = environment.corners
@@ -98,8 +111,13 @@ def draw_springs(ax, corners):
             ax.plot(*corners[[m, n]].T, color=plot.SPRING, linewidth=width, alpha=0.6, zorder=1)
 
 
+@panel("10a")
 def figure_10a():
-    """Moved obstacles, as the robot's laser sees them, and the subgoals that moved with them."""
+    """Performing the task of Figure 6b in modified environments: the subgoals.
+
+    Grey dotted boxes and grey crosses: before; solid boxes and black crosses: now. The robot found
+    the moved cans with its own laser. The figure-eight still goes round both.
+    """
     task, grid = recordings.figure_eight_task(), recordings.background_map()
     figure, axes = plt.subplots(1, len(recordings.LAYOUTS), figsize=(WIDE, 3), sharey=True)
     right = []
@@ -125,9 +143,14 @@ def show_part(axes, heights):
         ax.label_outer()
 
 
+@panel("10b", plain="plain, obstacles ignored", own="pursuit, going round obstacles")
 def figure_10b():
-    """The robot performing the adapted task among moved obstacles: the paper's kind of control, and
-    Dollop's own.
+    """Performing the task of Figure 6b in modified environments: the robot's runs.
+
+    Purple lines are runs of the simulated robot; the fan is their starts, each a little off. Above
+    the paper's kind of control, below Dollop's own, from the same starts: it follows the law more
+    closely, and leaves it only where it is near a can. Clearance is from the robot's rim to the
+    nearest obstacle.
     """
     layouts = range(len(recordings.LAYOUTS))
     figure, rows = plt.subplots(2, len(layouts), figsize=(WIDE, 4.9), sharex=True, sharey=True)
@@ -147,11 +170,14 @@ def figure_10b():
     return figure, {"matching_right": int(sum(recordings.matched_right(k) for k in layouts))} | metrics
 
 
+@panel("x1", literal="literal", robust="robust")
 def figure_x1():
-    """Beyond the paper: share of layouts with every corner matched right, by method, with boxes
-    ever less exact.
+    """Beyond the paper: how matching fares when box sizes are uncertain.
 
-    Left from boxes drawn at random, right from boxes as the laser sees them.
+    Left, objects drawn at random, each moved, and seen with box sizes off by up to so much; the
+    numbers are at 5 cm. The literal cost loses its way as soon as boxes are not exact. Right, cans
+    and cones that the simulated laser sees, each layout matched to the first: a laser sees one side
+    of a can and is off by some centimetres.
     """
     shares = matching_shares(noises=(0.0, 0.025, 0.05, 0.1, 0.15, 0.2), layouts=300, seed=recordings.SEED)
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), width_ratios=(2, 1), sharey=True)

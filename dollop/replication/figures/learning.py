@@ -7,6 +7,7 @@ from scipy.stats import binomtest
 
 from dollop import plot
 from dollop.replication import baseline, recordings
+from dollop.replication.figures.panel import panel
 from dollop.replication.figures.performing import CONTROLS, at_once, draw_runs, least_clearance
 
 SIZE = (6, 5.2)
@@ -20,12 +21,15 @@ LINES = {  # method: name in the metrics, marker, seeds, numbers of demonstratio
 }
 
 
+@panel("x2", merging="merging", mean="plain mean", hmm="HMM, BIC", left_to_right="left-to-right HMM, BIC")
 def figure_x2():
-    """Beyond the paper: the task found, and how far off, against the number of demonstrations;
-    merging beside others.
+    """Beyond the paper: learning a task from more and more demonstrations.
 
-    A slalom of six subgoals, in 30 % of the demonstrations one more that is no part of it. hmmlearn
-    takes far longer, so it gets fewer seeds: the bars, 95 % intervals, say what that costs.
+    Left, how often a method finds the right subgoals in the right order, bars being 95 % intervals;
+    right, how far off they are where their number is right. Dotted is the error to be expected of
+    the mean of so many subgoals, which falls as one over the root of their number; merging, which
+    has no more to go by, should lie on it, and lies a little to one side by chance, as these seeds
+    drew. The two hidden Markov models take far longer and get fewer seeds.
     """
     table = found_by_all()
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4))
@@ -98,13 +102,22 @@ def measured(table):
     return metrics
 
 
+@panel("11a")
 def figure_11a():
-    """The first demonstration of a slalom, with its subgoals and law."""
+    """The first demonstration of a task, its subgoals and control law.
+
+    A slalom past four cones, as tracked by the laser (thin line), and the law that was made of it
+    (wide line).
+    """
     return draw_demonstration(0)
 
 
+@panel("11b")
 def figure_11b():
-    """The second demonstration of it, among cones that stand elsewhere."""
+    """The second demonstration, in a different environment.
+
+    The same cones, elsewhere: the walk passes each on the same side as before.
+    """
     return draw_demonstration(1)
 
 
@@ -121,9 +134,14 @@ def draw_demonstration(k):
     return figure, {"n_segments": len(shown.law.segments), "mean_error_m": shown.law.error(walk)}
 
 
+@panel("12a")
 def figure_12a():
-    """The CDHMM merged from both demonstrations, in the environment of the first; the most-likely
-    path in red.
+    """The CDHMM estimated from the demonstrations of Figure 11, with the most-likely path.
+
+    Both demonstrations were mapped to the first one's environment (dots and triangles); then states
+    that the evidence cannot tell apart were merged. An ellipse is two standard deviations of where
+    a state's subgoal is expected. With two demonstrations that is nearly all prior: the model
+    starts from the spread below, and the two subgoals of a state change it little.
     """
     task = recordings.slalom_task()
     figure, ax = plt.subplots(figsize=SIZE)
@@ -142,9 +160,16 @@ def figure_12a():
     }
 
 
+@panel("12b", plain="plain, obstacles ignored", own="pursuit, going round obstacles")
 def figure_12b():
-    """The task in an environment that nobody demonstrated it in: the paper's kind of control, and
-    Dollop's own.
+    """The result after mapping the subgoals to a new environment.
+
+    Nobody ever walked among these cones; the fan is the starts of ten runs, the same above and
+    below. Above the paper's kind of control: the plain law, which knows of no obstacle. It touches
+    a cone, backs off and gets round it: past the third cone the law leaves less room than the robot
+    needs, for a law is a line, and moved subgoals do not keep every distance. Below Dollop's own:
+    it goes round what is in the way, and that alone is why nothing is touched. The circles are the
+    robot where it first touches something.
     """
     task, shown = recordings.new_slalom_task(), recordings.slalom_demonstration(0)
     sides = recordings.passing_sides(shown.law.response(), shown.environment.centres)

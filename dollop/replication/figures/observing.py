@@ -9,20 +9,30 @@ from dollop import plot
 from dollop.foreground import ForegroundGrid, endpoints, foreground_mask
 from dollop.observation import STATIC_EVERY, foreground_hits, static_boxes
 from dollop.replication import recordings
+from dollop.replication.figures.panel import panel
 
 GAIN, STATIC_GAIN = 0.6, 0.1  # defaults of `dollop.observe`
 
 
+@panel("1")
 def figure_1():
-    """Agent Orange: a Pioneer 2 DX with its SICK."""
+    """The mobile robot used in these experiments, Agent Orange.
+
+    A Pioneer 2 DX with its real dimensions: two driven wheels, a castor, and the SICK on top. The
+    paper has a photograph; this is the model that the simulation drives.
+    """
     from dollop.lab import render_robot
 
     return plot.picture(render_robot()), {}
 
 
+@panel("2")
 def figure_2():
-    """Conceptual flow diagram of Dollop: each stage in the paper's words, what does it here, what
-    it hands on.
+    """Conceptual flow diagram of Dollop.
+
+    Bold is the paper's word for a stage, under it the function that does it and the record that it
+    returns. What stands in the left frame happens once per demonstration; the right one brings all
+    demonstrations together. No arrow points back.
     """
     figure, ax = plt.subplots(figsize=(13, 4.6))
     for corner, size, words in FRAMES:
@@ -91,8 +101,13 @@ def draw_step(ax, before, after):
     ax.annotate("", after - half, before + half, arrowprops={"arrowstyle": "-|>", "linewidth": 1.5}, zorder=4)
 
 
+@panel("3")
 def figure_3():
-    """One sample laser scan in the laboratory."""
+    """Sample laser scan.
+
+    The robot sits at the bottom. Every dot is where a beam ended; behind each can and behind the
+    user lies a shadow. Nothing in the scan says which dots are a person.
+    """
     log = recordings.figure_eights().log
     figure, ax = plt.subplots(figsize=(6, 4.7))
     i = scan_beside_the_cans(log)
@@ -110,8 +125,17 @@ def scan_beside_the_cans(log):
     return int(np.searchsorted(log.t, log.t[0] + 6.0))
 
 
+@panel("4")
 def figure_4():
-    """Flow diagram for observing the user, each stage with its own intermediate picture."""
+    """Flow diagram for observing the user.
+
+    Every stage with its own intermediate picture. The background map explains walls and desks (grey
+    dots); what is left are foreground cells (blue). They go two ways. A quick foreground grid
+    follows the user: the darker a cell, the more often it was hit of late; its blobs are the
+    foreground objects, each with its centroid (plus), and tracking these tells the user (blue) from
+    what stands still. A second, slower grid forgets the user and keeps the static objects. The two
+    stages of the slower grid are drawn after the whole recording, all others at one moment of it.
+    """
     recording, grid = recordings.figure_eights(), recordings.background_map()
     log, observation = recording.log, recordings.figure_eights_observed()
     i = scan_beside_the_cans(log)
@@ -196,8 +220,12 @@ def draw_tracks(ax, observation, now):
     plot.path(ax, user.positions[user.t <= now], linewidth=2)
 
 
+@panel("5")
 def figure_5():
-    """The laboratory with two obstacles about four metres apart."""
+    """Example setup of the laboratory with two obstacles in the workspace.
+
+    Two trash cans about four metres apart among desks and stools; the robot watches from the wall.
+    """
     from dollop.lab import render_lab
 
     recording = recordings.figure_eights()
@@ -207,8 +235,14 @@ def figure_5():
 SIZE = (6, 5.2)
 
 
+@panel("6a")
 def figure_6a():
-    """The user's track over five figure-eights, with obstacles and robot."""
+    """The track of the user during five demonstrations of a figure-eight.
+
+    Orange dots are Kalman predictions, made while the user was out of sight behind a can. The bias
+    is no error of tracking: a laser sees only the near side of a body. The track error is what
+    remains without it.
+    """
     from dollop.lab.truth import track_error
 
     recording, observation = recordings.figure_eights(), recordings.figure_eights_observed()

@@ -6,6 +6,7 @@ import numpy as np
 
 from dollop import plot
 from dollop.replication import recordings
+from dollop.replication.figures.panel import panel
 from dollop.robot.performing import distances_to_law, return_times
 from dollop.trajectory import distance_to_polyline, mean_trajectory
 
@@ -17,8 +18,15 @@ CONTROLS = {  # suffix in the metrics: what it is, and how the robot is asked fo
 }
 
 
+@panel("6b")
 def figure_6b():
-    """Subgoals and control law extracted from the demonstrations of Fig. 6a."""
+    """The subgoals and control law extracted from the demonstrations.
+
+    Crosses are subgoals, where one LDS hands over to the next; the green line is the response of
+    the sequenced LDS started where the laps start, the arrowheads say which way it is walked. At
+    some subgoals it has a corner: each segment is fitted without regard to the next, and its
+    response arrives along the direction in which it is slowest. The paper: 6 LDS, 20 mm on average.
+    """
     recording, observation = recordings.figure_eights(), recordings.figure_eights_observed()
     law, laps = recordings.figure_eight_task().law, recordings.figure_eight_laps()
     figure, ax = plt.subplots(figsize=SIZE)
@@ -36,9 +44,14 @@ def figure_6b():
     }
 
 
+@panel("7a", own="plain law", pursuit="pursuit")
 def figure_7a():
-    """Ten runs of the robot: the paper's kind of law, and beside it the one that respects the
-    robot's dynamics.
+    """Ten runs of Agent Orange performing the estimated trajectory of Figure 6b.
+
+    Left the paper's kind of law, which points along the response and knows nothing of wheels, so
+    that the robot swings wide in the curves; right the one that respects the robot's dynamics. The
+    fan is the starts, each a little off. Distances are from the robot to the response from where
+    that run started, not to the green line, which starts where the laps do.
     """
     task = recordings.figure_eight_task()
     figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
@@ -61,9 +74,17 @@ def figure_7a():
     return figure, metrics["plain"] | {f"{key}_pursuit": value for key, value in metrics["pursuit"].items()}
 
 
+@panel("7b", own="plain law", aware="plain law, going round obstacles")
 def figure_7b():
-    """Five runs, each kidnapped once: the paper's kind of law, and beside it the same law going
-    round obstacles.
+    """The response of Agent Orange after being kidnapped.
+
+    Five runs, a shade and dashes each. A dotted line leads to where the robot was carried, and the
+    number there is the run's, the same left and right. The plain law heads for the active subgoal
+    through whatever is in the way, and the circle is the robot where that first ends in a contact;
+    that the paper's robot hit nothing was, as it says, a coincidence. Right the same law, which now
+    goes round obstacles: nothing else differs. One run may touch an obstacle several times, so
+    contacts and runs with a contact are counted apart. Time to return: until the robot is within
+    ten centimetres of the response from its start and stays there for a second.
     """
     task = recordings.figure_eight_task()
     figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)

@@ -1,0 +1,73 @@
+"""Panels: each drawing under its id, with the caption and what to look at as its docstring."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+
+__all__ = ["PANELS", "Panel", "panel"]
+
+PANELS = {}
+"""What has been registered, Panel by id, in no order to rely on."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel of a figure: how it is drawn, and what is written beside it.
+
+    Attributes
+    ----------
+    id : str
+        The paper's name for it, such as "6a"; x1, x2, ... are not in the paper.
+    draw : callable
+        Takes nothing and returns the matplotlib figure and a dict of its numbers.
+    columns : dict
+        Where the numbers are of several things: how their names end in metrics.json, and what each
+        thing is.
+    """
+
+    id: str
+    draw: Callable
+    columns: dict
+
+    @property
+    def caption(self):
+        """What it shows, after the paper's caption: the first paragraph of the drawing's docstring."""
+        return self._paragraphs()[0]
+
+    @property
+    def look(self):
+        """What to look at, and what to make of it: the rest of the docstring, in one line."""
+        return " ".join(self._paragraphs()[1:])
+
+    @property
+    def picture(self):
+        """File name of the PNG: "6a" -> "fig_06a.png", which sorts as the paper has it."""
+        number = self.id.rstrip("ab")
+        return f"fig_{number.zfill(2)}{self.id[len(number) :]}.png"
+
+    def _paragraphs(self):
+        return [" ".join(part.split()) for part in inspect.getdoc(self.draw).split("\n\n")]
+
+
+def panel(id, **columns):
+    """Register the drawing that follows as a panel.
+
+    Parameters
+    ----------
+    id : str
+        The paper's name for it.
+    **columns : str
+        What its numbers are of, where they are of several things.
+
+    Returns
+    -------
+    callable
+        The decorator; the drawing stays what it is.
+    """
+    ends = {"" if end == "own" else f"_{end}": words for end, words in columns.items()}
+
+    def register(draw):
+        PANELS[id] = Panel(id, draw, ends)
+        return draw
+
+    return register
