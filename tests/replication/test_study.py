@@ -20,7 +20,7 @@ from dollop.replication.claims import performing as trials_performing
 
 def claim_of(experiment):
     """A claim that wants a positive number of an experiment."""
-    criterion = Criterion("number", "a number", (0, np.inf), (0, 1))
+    criterion = Criterion("number", "a number", (0, np.inf))
     return Claim("fake", "I", "words", experiment, (criterion,), "nothing")
 
 
@@ -242,7 +242,7 @@ def test_the_verdict_follows_the_rule(answers, words):
 
 def test_a_criterion_is_met_only_by_the_whole_interval():
     """A mean above zero whose interval reaches below it leaves it open; no number at all does too."""
-    criterion = Criterion("number", "a number", (0, np.inf), (0, 1))
+    criterion = Criterion("number", "a number", (0, np.inf))
     for values, answer in (
         ([1.0, 1.1, 0.9], "yes"),
         ([1.0, -0.8, 0.5], "open"),
@@ -383,7 +383,12 @@ def test_passing_places_are_in_turn_left_and_right():
 
 
 def test_golden_numbers_are_those_of_one_seed():
-    """Times are left out, nan becomes None."""
+    """Times are left out, nan becomes None, and the tolerance is a share of the spread or the floor."""
     rows = [("time", 0, "seconds", 0.1), ("loss", 0, "lost_per_lap", np.nan), ("loss", 1, "lost_per_lap", 1.0)]
-    found = study.golden_numbers(study.as_table(rows))
-    assert found["numbers"] == {"loss": {"lost_per_lap": None}}
+    rows += [("scaled", seed, "off_percent", value) for seed, value in enumerate((2.0, 4.0, 6.0))]
+    rows += [("parameters", seed, "numbers", 44.0) for seed in range(3)]
+    assert study.golden_numbers(study.as_table(rows))["numbers"] == {
+        "loss": {"lost_per_lap": {"value": None, "tolerance": 1e-9}},
+        "parameters": {"numbers": {"value": 44.0, "tolerance": 4.4e-5}},
+        "scaled": {"off_percent": {"value": 2.0, "tolerance": 0.02}},
+    }
