@@ -20,9 +20,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dollop.checks import checked_array, checked_positions
 from dollop.environment import Environment
-from dollop.laser import wrapped
 from dollop.matching import match_confidently
+from dollop.pose import rotation, wrapped
 
 _EPSILON = 0.05**2  # m²: corners are not known better than to a cell of the foreground grid
 
@@ -86,7 +87,7 @@ class Association:
         if turned:
             matched = indices >= 0
             turn = layout_turn(self.environment.corners[matched], environment.corners[indices[matched]])
-            differences = differences @ _rotations(turn).T
+            differences = differences @ rotation(turn).T
         return np.einsum("km,kmd->kd", weights / totals, environment.corners[partners] + differences)
 
     def carried(self, environment, matching=None):
@@ -142,7 +143,7 @@ def associate(subgoals, environment, m=4):
     >>> association.relocate(Environment(boxes + [0.5, 2.0, 0.5, 2.0])).round(9).tolist()
     [[1.5, 3.0]]
     """
-    subgoals = _checked_positions(subgoals, "subgoals")
+    subgoals = checked_positions("subgoals", subgoals)
     corners = environment.corners
     if len(corners) == 0:
         raise ValueError("subgoals can only be associated with an environment of at least 1 object, got 0")
@@ -200,12 +201,8 @@ class Frames:
     directions: np.ndarray
 
     def __post_init__(self):
-        positions = _checked_positions(self.positions, "positions")
-        directions = np.array(self.directions, dtype=float)
-        if directions.shape != positions.shape[:1]:
-            raise ValueError(f"directions must have the shape {positions.shape[:1]}, got {directions.shape}")
-        if not np.isfinite(directions).all():
-            raise ValueError(f"directions must be finite, got {directions.tolist()}")
+        positions = checked_positions("positions", self.positions)
+        directions = checked_array("directions", self.directions, len(positions))
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "directions", wrapped(directions))
 
@@ -232,7 +229,7 @@ class FrameAssociation:
         """Where the subgoals (K, 2) are, in m, when the frames stand elsewhere: the same frames in the same order."""
         if len(frames) != len(self.local):
             raise ValueError(f"the number of frames must stay {len(self.local)}, got {len(frames)}")
-        moved = self.local @ _rotations(frames.directions).swapaxes(1, 2) + frames.positions[:, None]
+        moved = self.local @ rotation(frames.directions).swapaxes(1, 2) + frames.positions[:, None]
         return np.einsum("mk,mkd->kd", self.weights, moved)
 
 
@@ -265,11 +262,9 @@ def associate_with_frames(subgoals, frames):
     >>> bool(associate_with_frames([[[1, 0]], [[1, 2]]], [still, moved]).weights[1, 0] > 0.8)
     True
     """
-    subgoals = np.array(subgoals, dtype=float)
-    if subgoals.ndim != 3 or subgoals.shape[2] != 2 or subgoals.shape[0] == 0:
-        raise ValueError(f"subgoals must have the shape (D, K, 2) with D at least 1, got {subgoals.shape}")
-    if not np.isfinite(subgoals).all():
-        raise ValueError("subgoals must be finite, got a value that is not")
+    subgoals = checked_array("subgoals", subgoals, "D", "K", 2)
+    if not len(subgoals):
+        raise ValueError("subgoals must be of one demonstration at least, got none")
     counts = [len(f) for f in frames]
     if len(counts) != len(subgoals) or len(set(counts)) != 1 or counts[0] == 0:
         raise ValueError(
@@ -291,20 +286,4 @@ def _variances(local):
 
 def _seen_from(frames, positions):
     """(M, K, 2): positions (K, 2) in the coordinates of each frame."""
-    return (positions - frames.positions[:, None]) @ _rotations(frames.directions)
-
-
-def _rotations(angles):
-    """(..., 2, 2) rotation matrices, counter-clockwise."""
-    cos, sin = np.cos(angles), np.sin(angles)
-    return np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
-
-
-def _checked_positions(positions, name):
-    positions = np.array(positions, dtype=float)
-    if positions.ndim != 2 or positions.shape[1] != 2:
-        raise ValueError(f"{name} must have the shape (N, 2), got {positions.shape}")
-    if not np.isfinite(positions).all():
-        number = np.flatnonzero(~np.isfinite(positions).all(axis=1))[0]
-        raise ValueError(f"{name} must be finite, got {positions[number].tolist()} in row {number}")
-    return positions
+    return (positions - frames.positions[:, None]) @ rotation(frames.directions)

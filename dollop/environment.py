@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.distance import cdist
+import scipy
+
+from dollop.checks import checked_array
 
 # A corner's place in its box: 0 lower left, then counter-clockwise. The columns are those of a box (x, y).
 _CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
@@ -63,14 +65,9 @@ class Environment:
 
 
 def _checked_boxes(boxes):
-    boxes = np.array(boxes, dtype=float)
-    if boxes.size == 0:
-        boxes = boxes.reshape(0, 4)
-    if boxes.ndim != 2 or boxes.shape[1] != 4:
-        raise ValueError(f"boxes must have the shape (N, 4), got {boxes.shape}")
-    if not np.isfinite(boxes).all():
-        number = np.flatnonzero(~np.isfinite(boxes).all(axis=1))[0]
-        raise ValueError(f"boxes must be finite, got {boxes[number].tolist()} for object {number}")
+    if np.size(boxes) == 0:
+        boxes = np.empty((0, 4))
+    boxes = checked_array("boxes", boxes, "N", 4)
     negative = (boxes[:, 2:] < boxes[:, :2]).any(axis=1)
     if negative.any():
         number = np.flatnonzero(negative)[0]
@@ -160,7 +157,7 @@ def integer_costs(corners_i, corners_j, alpha=1e3):
     ValueError
         Where two corners of one environment coincide.
     """
-    changes = cdist(spring_forces(corners_i), spring_forces(corners_j))
+    changes = scipy.spatial.distance.cdist(spring_forces(corners_i), spring_forces(corners_j))
     return np.ceil(alpha * changes - _ROUNDING).astype(np.int64)
 
 

@@ -7,10 +7,10 @@ foreground grid; adjacent occupied cells are a blob; a blob that is large enough
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
-from scipy.sparse.csgraph import connected_components
+import scipy
 
-from dollop.laser import check_positive
+from dollop.checks import check_positive
+from dollop.gridmap import in_metres
 
 EIGHT_CONNECTED = np.ones((3, 3), dtype=bool)
 
@@ -217,7 +217,8 @@ class ForegroundGrid:
     def centres(self, cells):
         """Centres (M, 2) in m of the cells with flat indices `cells` (M,)."""
         row, column = np.divmod(cells, self.shape[1])
-        return self.origin + self.resolution * (np.column_stack([column, row]) + 0.5)
+        places = in_metres(column + 0.5, row + 0.5, self.origin, self.resolution)
+        return np.column_stack(places)
 
     def blobs(self, threshold=0.5, min_area=0.01):
         """Blobs of occupied cells, remembered ones included.
@@ -267,14 +268,14 @@ class ForegroundGrid:
 def near_together(points, distance):
     """Group numbers (M,) of points (M, 2), where chains of points nearer than `distance` are one group."""
     apart = np.linalg.norm(points[:, None] - points, axis=2)
-    return connected_components(apart < distance, directed=False)[1]
+    return scipy.sparse.csgraph.connected_components(apart < distance, directed=False)[1]
 
 
 def blob_centroids(cells, labels, origin, resolution):
     """Mean (K, 2) in m of the cells (M, 2) of each blob that has any; labels (M,) from 0."""
     size = np.bincount(labels)
-    sums = np.stack([np.bincount(labels, cells[:, k]) for k in (1, 0)], axis=1)
-    return origin + resolution * (sums[size > 0] / size[size > 0, None] + 0.5)
+    row, column = (np.bincount(labels, each)[size > 0] / size[size > 0] for each in cells.T)
+    return np.column_stack(in_metres(column + 0.5, row + 0.5, origin, resolution))
 
 
 def find_blobs(cells, resolution, min_area=0.01):
@@ -298,7 +299,7 @@ def find_blobs(cells, resolution, min_area=0.01):
     rows, columns = closed_up(cells[:, 0]), closed_up(cells[:, 1])
     window = np.zeros((rows.max() + 1, columns.max() + 1), dtype=bool)
     window[rows, columns] = True
-    labelled, count = ndimage.label(window, EIGHT_CONNECTED)
+    labelled, count = scipy.ndimage.label(window, EIGHT_CONNECTED)
     labels = labelled[rows, columns] - 1
     areas = resolution**2 * np.bincount(labels, minlength=count)
     large = areas >= min_area - 1e-12
@@ -333,7 +334,8 @@ def bounding_boxes(blobs, origin, resolution):
     """
     boxes = np.empty((len(blobs), 4))
     for k in range(len(blobs)):
-        low = blobs.cells[blobs.labels == k].min(axis=0)
-        high = blobs.cells[blobs.labels == k].max(axis=0) + 1
-        boxes[k] = np.concatenate([origin + resolution * low[::-1], origin + resolution * high[::-1]])
+        cells = blobs.cells[blobs.labels == k]
+        (bottom, left), (top, right) = cells.min(axis=0), cells.max(axis=0) + 1
+        boxes[k, :2] = in_metres(left, bottom, origin, resolution)
+        boxes[k, 2:] = in_metres(right, top, origin, resolution)
     return boxes

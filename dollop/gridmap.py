@@ -5,12 +5,21 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
-from dollop.formats import carmen, ros_map
-from dollop.formats.carmen import OCCUPIED_FROM
+from dollop.checks import check_positive
+from dollop.formats import carmen_map
+from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError
-from dollop.laser import check_positive
+
+__all__ = [
+    "OccupancyGrid",
+    "check_is_map",
+    "covered_cells",
+    "flat_cells",
+    "in_cells",
+    "in_metres",
+]
 
 MAX_CELLS = 100_000_000
 
@@ -62,6 +71,11 @@ class OccupancyGrid:
             raise ValueError(f"origin must be a finite x, y, got {self.origin}")
         self.occupancy.flags.writeable = False
 
+    def __repr__(self):
+        height, width = self.occupancy.shape
+        share = self.occupied.mean()
+        return f"OccupancyGrid of {width} x {height} cells of {self.resolution:g} m, {share:.0%} occupied"
+
     @classmethod
     def from_log(cls, log, resolution=0.05, max_range=20.0):
         """Count hits and passes of every beam; a cell's occupancy is hits / (hits + passes).
@@ -100,8 +114,9 @@ class OccupancyGrid:
         hits, passes = np.zeros(np.prod(shape)), np.zeros(np.prod(shape))
         for scans in np.array_split(np.arange(len(log)), 1 + len(log) * log.angles.size // 10_000):
             ends, samples = _beam_samples(log, scans, reach[scans], log.ranges[scans] <= max_range, resolution)
-            hits += np.bincount(_flat(ends, origin, resolution, shape), minlength=hits.size)
-            passes += np.bincount(_flat(samples, origin, resolution, shape), minlength=hits.size)
+            for count, points in ((hits, ends), (passes, samples)):
+                cells, _ = flat_cells(points, origin, resolution, shape)
+                count += np.bincount(cells, minlength=count.size)
         seen = hits + passes
         occupancy = np.divide(hits, seen, out=np.full(hits.size, np.nan), where=seen > 0)
         return cls(occupancy.reshape(shape), origin, resolution)
@@ -125,8 +140,7 @@ class OccupancyGrid:
             If the file is not what its name says.
         """
         path = Path(path)
-        check_is_map(path)
-        content = carmen.read_map(path) if path.suffix == ".map" else ros_map.read_map(path)
+        content = _format_of(path).read_map(path)
         try:
             return cls(*content)
         except ValueError as error:
@@ -143,9 +157,7 @@ class OccupancyGrid:
             The file; it appears whole or not at all, and the picture with it.
         """
         path = Path(path)
-        check_is_map(path)
-        write_map = carmen.write_map if path.suffix == ".map" else ros_map.write_map
-        write_map(path, self.occupancy, self.origin, self.resolution)
+        _format_of(path).write_map(path, self.occupancy, self.origin, self.resolution)
 
     @property
     def occupied(self):
@@ -182,8 +194,9 @@ class OccupancyGrid:
         (..., 2) int array
             Row and column.
         """
-        offsets = np.asarray(points, dtype=float) - self.origin
-        return np.floor(offsets[..., ::-1] / self.resolution).astype(int)
+        x, y = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+        column, row = in_cells(x, y, self.origin, self.resolution)
+        return np.floor(np.stack([row, column], axis=-1)).astype(int)
 
     def cell_centres(self, cells):
         """Centres of cells.
@@ -198,7 +211,8 @@ class OccupancyGrid:
         (..., 2) float array
             x, y in m.
         """
-        return (np.asarray(cells)[..., ::-1] + 0.5) * self.resolution + self.origin
+        row, column = np.moveaxis(np.asarray(cells), -1, 0)
+        return np.stack(in_metres(column + 0.5, row + 0.5, self.origin, self.resolution), axis=-1)
 
     def covers(self, points):
         """Which points lie on the map.
@@ -229,7 +243,8 @@ class OccupancyGrid:
     @cached_property
     def _distances(self):
         if self.occupied.any():
-            distances = ndimage.distance_transform_edt(~self.occupied, sampling=self.resolution)
+            nearest = scipy.ndimage.distance_transform_edt
+            distances = nearest(~self.occupied, sampling=self.resolution)
         else:
             distances = np.full(self.occupancy.shape, np.inf)
         distances.flags.writeable = False
@@ -262,13 +277,24 @@ def check_is_map(path):
         raise FormatError("a map is named .yaml (ROS) or .map (CARMEN)", path)
 
 
+def _format_of(path):
+    """The module that reads and writes maps of this name."""
+    check_is_map(path)
+    if path.suffix == ".map":
+        return carmen_map
+    from dollop.formats import ros_map  # only now: PyYAML and Pillow take long to load
+
+    return ros_map
+
+
 def _frame(log, reach, resolution):
     """Corner and shape of a grid that holds the sensor and the ends of all beams, with a cell to spare."""
     bearings = log.poses[:, 2, None] + log.angles
     x = log.poses[:, 0, None] + reach * np.cos(bearings)
     y = log.poses[:, 1, None] + reach * np.sin(bearings)
-    corners = [(min(v.min(), s.min()), max(v.max(), s.max())) for v, s in ((x, log.poses[:, 0]), (y, log.poses[:, 1]))]
-    (left, right), (low, high) = [(np.floor(a / resolution) - 1, np.floor(b / resolution) + 2) for a, b in corners]
+    ends = np.vstack([np.column_stack([x.ravel(), y.ravel()]), log.poses[:, :2]])
+    left, low = np.floor(ends.min(axis=0) / resolution) - 1
+    right, high = np.floor(ends.max(axis=0) / resolution) + 2
     if (right - left) * (high - low) > MAX_CELLS:
         raise ValueError(f"{right - left:.0f} x {high - low:.0f} cells of {resolution} m are more than {MAX_CELLS}")
     return (left * resolution, low * resolution), (int(high - low), int(right - left))
@@ -291,6 +317,98 @@ def _beam_samples(log, scans, reach, is_hit, resolution):
     return ends, samples
 
 
-def _flat(points, origin, resolution, shape):
-    cols, rows = np.floor((points - origin) / resolution).astype(int).T
-    return rows * shape[1] + cols
+def in_cells(x, y, origin, resolution):
+    """Places in units of cells, from the grid's lower left corner: cell k reaches from k to k + 1.
+
+    Parameters
+    ----------
+    x, y : float or (...) float array
+        In m.
+    origin : (float, float)
+        Lower left cell's lower left corner, x, y in m.
+    resolution : float
+        Side of a cell in m.
+
+    Returns
+    -------
+    column, row : float or (...) float array
+    """
+    return (x - origin[0]) / resolution, (y - origin[1]) / resolution
+
+
+def in_metres(column, row, origin, resolution):
+    """The inverse of `in_cells`: the centre of a cell lies at its column + 0.5, its row + 0.5.
+
+    Parameters
+    ----------
+    column, row : float or (...) float array
+        In units of cells.
+    origin : (float, float)
+        Lower left cell's lower left corner, x, y in m.
+    resolution : float
+        Side of a cell in m.
+
+    Returns
+    -------
+    x, y : float or (...) float array
+        In m.
+
+    Examples
+    --------
+    >>> in_metres(*in_cells(1.23, -0.5, (0.5, -2.0), 0.05), (0.5, -2.0), 0.05)
+    (1.23, -0.5)
+    """
+    return column * resolution + origin[0], row * resolution + origin[1]
+
+
+def flat_cells(points, origin, resolution, shape):
+    """Which cell each point lies in, counted row by row.
+
+    Parameters
+    ----------
+    points : (M, 2) float array
+        x, y in m.
+    origin : (float, float)
+        Lower left cell's lower left corner, x, y in m.
+    resolution : float
+        Side of a cell in m.
+    shape : (int, int)
+        Rows and columns of the grid.
+
+    Returns
+    -------
+    cells : (K,) int array
+        Flat indices of the cells of the points that lie on the grid.
+    inside : (M,) bool array
+        Which of the points do.
+    """
+    column, row = (np.floor(each).astype(np.intp) for each in in_cells(*points.T, origin, resolution))
+    inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
+    return (row * shape[1] + column)[inside], inside
+
+
+def covered_cells(boxes, origin, resolution, shape):
+    """Cells that one of several boxes reaches into.
+
+    Parameters
+    ----------
+    boxes : (N, 4) float array
+        xmin, ymin, xmax, ymax in m.
+    origin : (float, float)
+        Lower left cell's lower left corner, x, y in m.
+    resolution : float
+        Side of a cell in m.
+    shape : (int, int)
+        Rows and columns of the grid.
+
+    Returns
+    -------
+    (H, W) bool array
+    """
+    covered = np.zeros(shape, dtype=bool)
+    columns, rows = in_cells(boxes[:, ::2].T, boxes[:, 1::2].T, origin, resolution)
+    low = np.floor(np.stack([columns[0], rows[0]], axis=1) + 1e-9).astype(int).clip(0)
+    high = np.ceil(np.stack([columns[1], rows[1]], axis=1) - 1e-9).astype(int).clip(0)
+    for (left, bottom), (right, top) in zip(low, high, strict=True):
+        covered[bottom:top, left:right] = True
+    return covered

@@ -1,8 +1,13 @@
 """A laser log in memory: what every reader returns and every stage of Sec. II takes."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
+
+from dollop.checks import check_positive, checked_array
+from dollop.pose import wrapped
+
+__all__ = ["LaserLog"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,57 +48,43 @@ class LaserLog:
     max_range: float
 
     def __post_init__(self):
-        for field in fields(self)[:-1]:
-            object.__setattr__(self, field.name, np.array(getattr(self, field.name), dtype=float))
+        t, angles = checked_array("t", self.t, "T"), checked_array("angles", self.angles, "B")
+        if 0 in (t.size, angles.size):
+            raise ValueError(f"a log must hold a scan and a beam, got {t.size} and {angles.size}")
+        ranges = checked_array("ranges", self.ranges, t.size, angles.size, finite=False)
+        poses = checked_array("poses", self.poses, t.size, 3)
+        poses[:, 2] = wrapped(poses[:, 2])
+        for name, array in (("t", t), ("ranges", ranges), ("angles", angles), ("poses", poses)):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
         object.__setattr__(self, "max_range", float(self.max_range))
-        self._check_shapes()
-        _check_increasing("t", self.t)
-        _check_increasing("angles", self.angles)
+        _check_increasing("t", t)
+        _check_increasing("angles", angles)
         check_positive("max_range", self.max_range)
-        self._check_values()
-        self.poses[:, 2] = wrapped(self.poses[:, 2])
-        for field in fields(self)[:-1]:
-            getattr(self, field.name).flags.writeable = False
+        _check_ranges(ranges, self.max_range)
 
     def __len__(self):
         return len(self.t)
 
-    def _check_shapes(self):
-        if self.t.ndim != 1 or self.angles.ndim != 1 or 0 in (self.t.size, self.angles.size):
-            raise ValueError(f"t and angles must have shape (T,) and (B,), got {self.t.shape} and {self.angles.shape}")
-        expected = {"ranges": (self.t.size, self.angles.size), "poses": (self.t.size, 3)}
-        for name, shape in expected.items():
-            if getattr(self, name).shape != shape:
-                raise ValueError(f"{name} must have shape {shape}, got {getattr(self, name).shape}")
-
-    def _check_values(self):
-        if not np.isfinite(self.poses).all():
-            raise ValueError(f"poses must be finite, got {self.poses[~np.isfinite(self.poses)][0]}")
-        wrong = ~((self.ranges >= 0) & ((self.ranges <= self.max_range) | np.isposinf(self.ranges)))
-        if wrong.any():
-            scan, beam = np.argwhere(wrong)[0]
-            rule = f"a range must be in [0, max_range = {self.max_range:g}], or inf where nothing came back"
-            raise ValueError(f"{rule}; got {self.ranges[scan, beam]} in scan {scan}, beam {beam}")
+    def __repr__(self):
+        scans, beams = self.ranges.shape
+        span, fov = self.t[-1] - self.t[0], np.degrees(self.angles[-1] - self.angles[0])
+        return f"LaserLog of {scans} scans in {span:.1f} s, {beams} beams over {fov:.0f} degrees"
 
 
-def check_positive(name, value, or_zero=False):
-    """Raise ValueError for a number that is negative, infinite or NaN, or zero unless that is allowed."""
-    if not (0 < value < np.inf or (or_zero and value == 0)):
-        raise ValueError(
-            f"{name} must be {'finite and not negative' if or_zero else 'positive and finite'}, got {value}"
-        )
-
-
-def wrapped(angles):
-    """Angles in rad, an array, in (-pi, pi]; those that are there already keep their last bit."""
-    return np.where((angles > -np.pi) & (angles <= np.pi), angles, np.pi - (np.pi - angles) % (2 * np.pi))
+def _check_ranges(ranges, max_range):
+    """Every range must be a distance that the sensor can report, or `inf`."""
+    wrong = ~((ranges >= 0) & ((ranges <= max_range) | np.isposinf(ranges)))
+    if wrong.any():
+        scan, beam = np.argwhere(wrong)[0]
+        rule = f"a range must be in [0, max_range = {max_range:g}], or inf where nothing came back"
+        raise ValueError(f"{rule}; got {ranges[scan, beam]} in scan {scan}, beam {beam}")
 
 
 def _check_increasing(name, values):
-    """Values must be finite and each greater than the one before."""
-    if not np.isfinite(values).all():
-        raise ValueError(f"{name} must be finite, got {values[~np.isfinite(values)][0]}")
+    """Each value must be greater than the one before."""
     falls = np.flatnonzero(np.diff(values) <= 0)
     if falls.size:
         i = falls[0]
-        raise ValueError(f"{name} must increase, got {values[i]} and then {values[i + 1]} at index {i + 1}")
+        before, after = values[i], values[i + 1]
+        raise ValueError(f"{name} must increase, got {before} and then {after} at index {i + 1}")

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dollop.pose import rotation
 from dollop.trajectory import check_trajectories, retime
 
 SHRINKAGE = 1e-3  # share of the mean variance that is added to every direction of G0
@@ -142,7 +143,7 @@ class LDS:
 
     def turned(self, angle):
         """The LDS turned about its subgoal by an angle in rad: A becomes R A R^T."""
-        R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        R = rotation(angle)
         G0, G1 = self.statistics.G0, self.statistics.G1
         return replace(self, statistics=Statistics(R @ G0 @ R.T, R @ G1 @ R.T))
 

@@ -24,11 +24,9 @@ from itertools import combinations, permutations
 from math import comb, factorial, pi
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
+import scipy
 
+from dollop.checks import check_choice, check_positive
 from dollop.environment import integer_costs
 
 _KAPPA = 1.0  # of a layout that was turned, small turns are a little likelier
@@ -106,11 +104,9 @@ def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4
     >>> match(Environment(boxes), Environment(boxes[[2, 0, 1]])).indices.tolist()
     [4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3]
     """
-    if method not in ("robust", "literal"):
-        raise ValueError(f"method must be 'robust' or 'literal', got {method!r}")
-    for name, length in (("left_out", left_out), ("moved", moved)):
-        if not 0 < length < np.inf:
-            raise ValueError(f"{name} must be positive and finite, got {length}")
+    check_choice("method", method, ("robust", "literal"))
+    check_positive("left_out", left_out)
+    check_positive("moved", moved)
     if min(len(environment_i), len(environment_j)) < 2:
         raise ValueError(
             f"matching compares layouts: each environment needs at least 2 objects, "
@@ -151,7 +147,7 @@ def _match_literally(environment_i, environment_j):
             f"got {len(environment_i)} and {len(environment_j)}"
         )
     costs = integer_costs(environment_i.corners, environment_j.corners)
-    rows, indices = linear_sum_assignment(costs)
+    rows, indices = scipy.optimize.linear_sum_assignment(costs)
     margin = second_best(costs, indices)
     return Matching(indices, float(costs[rows, indices].sum()), margin, margin > len(indices))
 
@@ -239,7 +235,7 @@ def _alignments(x, y, price):
     pivots = np.r_[x.mean(), np.tile(anchors, len(y))]
     shifts, pivots = np.tile(shifts, 8), np.tile(pivots, 8)
     images = np.exp(1j * turns)[:, None] * (probes - pivots[:, None]) + (pivots + shifts)[:, None]
-    distances, _ = cKDTree(np.c_[y.real, y.imag]).query(np.stack([images.real, images.imag], axis=-1))
+    distances, _ = scipy.spatial.cKDTree(np.c_[y.real, y.imag]).query(np.stack([images.real, images.imag], axis=-1))
     fits = np.minimum(distances**2 / 2, 2 * price).sum(axis=1)
     chosen = np.argsort(fits, kind="stable")[:_STARTS]
     in_place = (0.0, 0.0, 0.0)
@@ -260,7 +256,7 @@ def _refine(x, y, price, *alignment):
 
 def _assign(moves, price):
     # A pair that costs more than leaving out both may as well be assigned at that price, and is dropped after.
-    rows, columns = linear_sum_assignment(np.minimum(moves, 2 * price))
+    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(moves, 2 * price))
     near = moves[rows, columns] < 2 * price
     partners = np.full(len(moves), -1)
     partners[rows[near]] = columns[near]
@@ -344,8 +340,8 @@ def _cheapest_cycle_of_many(edges):
     reduced = np.maximum(edges + potentials[:, None] - potentials, 0)
     starts, ends = np.nonzero(reduced < swap)
     # A stored zero is an edge without weight, as wanted.
-    graph = csr_array((reduced[starts, ends], (starts, ends)), shape=edges.shape)
-    back = dijkstra(graph, limit=swap)
+    graph = scipy.sparse.csr_array((reduced[starts, ends], (starts, ends)), shape=edges.shape)
+    back = scipy.sparse.csgraph.dijkstra(graph, limit=swap)
     return min(swap, (reduced[starts, ends] + back[ends, starts]).min(initial=np.inf))
 
 

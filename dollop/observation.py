@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dollop.checks import check_positive
 from dollop.environment import Environment
 from dollop.foreground import (
     ForegroundGrid,
@@ -13,7 +14,7 @@ from dollop.foreground import (
     seen_free,
     surface_points,
 )
-from dollop.laser import check_positive
+from dollop.gridmap import flat_cells
 from dollop.tracking import Track, Tracker, identify_user, track_objects, user_track
 
 STATIC_EVERY = 5
@@ -119,11 +120,9 @@ def foreground_hits(log, background, background_radius=0.20):
     points = endpoints(log)
     mask = foreground_mask(points, background, background_radius)
     scan, on_surface = surface_points(points, mask, spacing=background.resolution)
-    rows, columns = background.occupancy.shape
-    cell = np.floor((on_surface - np.asarray(background.origin[:2])) / background.resolution).astype(np.intp)
-    inside = ((cell >= 0) & (cell < [columns, rows])).all(axis=1)
-    flat = cell[inside, 1] * columns + cell[inside, 0]
-    return np.split(flat, np.searchsorted(scan[inside], np.arange(1, len(log.t))))
+    grid = background.origin, background.resolution, background.occupancy.shape
+    cells, inside = flat_cells(on_surface, *grid)
+    return np.split(cells, np.searchsorted(scan[inside], np.arange(1, len(log.t))))
 
 
 def static_boxes(grid, sensor, user=None, min_area=0.01, recent=1.0):

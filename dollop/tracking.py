@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from math import factorial
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
+
+from dollop.checks import check_choice, check_positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +73,7 @@ class Motion:
         if self.order not in (2, 3):
             raise ValueError(f"order must be 2 (velocity) or 3 (acceleration), got {self.order}")
         for name in ("noise", "measurement_sd"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+            check_positive(name, getattr(self, name))
 
     def transition(self, dt):
         """F (n, n) and Q (n, n) over `dt` seconds: integrated white noise (Bar-Shalom et al. 2001, Sec. 6.2)."""
@@ -141,7 +142,7 @@ def match_jointly(cost, gate):
     """
     if not cost.size:
         return np.zeros(0, int), np.zeros(0, int)
-    tracks, objects = linear_sum_assignment(np.minimum(cost, gate))
+    tracks, objects = scipy.optimize.linear_sum_assignment(np.minimum(cost, gate))
     within = cost[tracks, objects] <= gate
     return tracks[within], objects[within]
 
@@ -180,10 +181,8 @@ class Tracker:
     disappear_after: float = 5.0
 
     def __post_init__(self):
-        if self.matching not in MATCHERS:
-            raise ValueError(f"matching must be one of {sorted(MATCHERS)}, got {self.matching!r}")
-        if self.occlusion not in ("kalman", "particles"):
-            raise ValueError(f"occlusion must be 'kalman' or 'particles', got {self.occlusion!r}")
+        check_choice("matching", self.matching, MATCHERS)
+        check_choice("occlusion", self.occlusion, ("kalman", "particles"))
         for name in ("gate", "gate_min", "gate_max", "disappear_after"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, got {getattr(self, name)}")

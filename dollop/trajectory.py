@@ -5,8 +5,9 @@ A trajectory is an (N, d) array of positions in m in the order they were visited
 
 import numpy as np
 
+from dollop.checks import checked_positions
+
 ROUNDS = 3  # how often walks are laid onto their mean: then it hardly changes any more
-FARTHEST = 1e9  # m from the origin: coordinates beyond are no metres, and their squares would overflow
 
 
 def check_trajectory(trajectory, name="trajectory"):
@@ -28,17 +29,9 @@ def check_trajectory(trajectory, name="trajectory"):
     ValueError
         Fewer than three points, not planar, not finite, farther away than 1e9 m, or no movement.
     """
-    points = np.asarray(trajectory, float)
-    if points.ndim != 2 or points.shape[1] != 2:
-        raise ValueError(f"{name} must have shape (N, 2), got {points.shape}")
+    points = checked_positions(name, trajectory)
     if len(points) < 3:
         raise ValueError(f"{name} must have at least three points, got {len(points)}")
-    finite = np.isfinite(points).all(axis=1)
-    if not finite.all():
-        row = int(np.argmin(finite))
-        raise ValueError(f"{name} must be finite, got {points[row]} at sample {row}")
-    if np.abs(points).max() > FARTHEST:
-        raise ValueError(f"{name} must lie within {FARTHEST:g} m of the origin, got {np.abs(points).max():g} m")
     if not (points != points[0]).any():
         raise ValueError(f"{name} must move, got {len(points)} times the position {points[0]}")
     return points

@@ -154,7 +154,7 @@ def test_bad_associations_are_refused():
             associate(SUBGOALS, environment, m=m)
     with pytest.raises(ValueError, match="subgoals must be finite, got .*nan.* in row 1"):
         associate([[0, 0], [np.nan, 1]], environment)
-    with pytest.raises(ValueError, match=r"subgoals must have the shape \(N, 2\), got \(2,\)"):
+    with pytest.raises(ValueError, match=r"subgoals must have shape \(N, 2\), got \(2,\)"):
         associate([0, 0], environment)
     either_way = Environment([[0, 0, 1, 1], [3, 0, 4, 1]]), Environment([[0, 0, 1, 1], [0, 3, 1, 4]])
     with pytest.raises(
@@ -224,7 +224,7 @@ def test_what_varies_little_beside_an_object_belongs_to_it():
 def test_bad_frames_are_refused():
     """Shapes that do not belong together, NaN, frames missing in a demonstration: errors by name."""
     two, three = Frames(np.zeros((2, 2)), np.zeros(2)), Frames(np.zeros((3, 2)), np.zeros(3))
-    with pytest.raises(ValueError, match=r"directions must have the shape \(2,\), got \(3,\)"):
+    with pytest.raises(ValueError, match=r"directions must have shape \(2,\), got \(3,\)"):
         Frames(np.zeros((2, 2)), np.zeros(3))
     with pytest.raises(ValueError, match="directions must be finite"):
         Frames(np.zeros((1, 2)), [np.nan])

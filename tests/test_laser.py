@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from dollop.laser import LaserLog, check_positive
+from dollop.checks import check_positive
+from dollop.laser import LaserLog
 
 GOOD = {
     "t": [0.0, 0.1],
@@ -49,16 +50,16 @@ def test_headings_are_wrapped():
         ("t", [0.1, 0.1], r"t must increase, got 0.1 and then 0.1 at index 1"),
         ("t", [0.1, 0.0], r"t must increase, got 0.1 and then 0.0 at index 1"),
         ("t", [0.0, np.nan], r"t must be finite, got nan"),
-        ("t", [], r"t and angles must have shape"),
+        ("t", [], r"a log must hold a scan and a beam, got 0 and 3"),
         ("angles", [1.0, 0.0, -1.0], r"angles must increase, got 1.0 and then 0.0"),
-        ("angles", [[-1.0, 0.0, 1.0]], r"t and angles must have shape"),
+        ("angles", [[-1.0, 0.0, 1.0]], r"angles must have shape \(B,\), got \(1, 3\)"),
         ("ranges", [[1.0, 2.0], [1.0, 2.0]], r"ranges must have shape \(2, 3\), got \(2, 2\)"),
         ("ranges", [[1.0, np.nan, 1.0], [1.0, 1.0, 1.0]], r"got nan in scan 0, beam 1"),
         ("ranges", [[1.0, 1.0, 1.0], [1.0, 1.0, -0.5]], r"got -0.5 in scan 1, beam 2"),
         ("ranges", [[1.0, 1.0, 8.5], [1.0, 1.0, 1.0]], r"\[0, max_range = 8\].*got 8.5 in scan 0, beam 2"),
         ("ranges", [[1.0, 1.0, -np.inf], [1.0, 1.0, 1.0]], r"got -inf in scan 0, beam 2"),
         ("poses", [[0.0, 0.0], [0.0, 0.0]], r"poses must have shape \(2, 3\), got \(2, 2\)"),
-        ("poses", [[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]], r"poses must be finite, got inf"),
+        ("poses", [[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]], r"poses must be finite, got .*inf.* in row 1"),
         ("max_range", 0.0, r"max_range must be positive and finite, got 0.0"),
         ("max_range", np.inf, r"max_range must be positive and finite, got inf"),
         ("max_range", np.nan, r"max_range must be positive and finite, got nan"),

@@ -295,8 +295,8 @@ def test_no_objects_no_tracks():
 @pytest.mark.parametrize(
     ("choice", "says"),
     [
-        ({"matching": "best"}, r"matching must be one of \['greedy', 'joint'\], got 'best'"),
-        ({"occlusion": "hope"}, "occlusion must be 'kalman' or 'particles', got 'hope'"),
+        ({"matching": "best"}, r"matching must be one of 'greedy', 'joint', got 'best'"),
+        ({"occlusion": "hope"}, "occlusion must be one of 'kalman', 'particles', got 'hope'"),
         ({"gate": 0}, "gate must be positive, got 0"),
         ({"gate_min": -1}, "gate_min must be positive, got -1"),
         ({"gate_max": -0.5}, "gate_max must be positive, got -0.5"),
@@ -313,5 +313,5 @@ def test_motion_out_of_range_is_named():
     """An error names the parameter, its value and the rule."""
     with pytest.raises(ValueError, match="order must be 2"):
         Motion(order=1)
-    with pytest.raises(ValueError, match="noise must be positive, got -1"):
+    with pytest.raises(ValueError, match="noise must be positive and finite, got -1"):
         Motion(noise=-1)

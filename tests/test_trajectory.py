@@ -114,8 +114,8 @@ def test_mean_of_one_walk_is_the_walk():
     [
         ([[0, 0], [1, 1]], "at least three points, got 2"),
         ([[1, 2]] * 4, "must move"),
-        ([[0, 0], [1, np.nan], [2, 0]], "finite.*sample 1"),
-        ([[0, 0], [np.inf, 0], [2, 0]], "finite.*sample 1"),
+        ([[0, 0], [1, np.nan], [2, 0]], "finite.*row 1"),
+        ([[0, 0], [np.inf, 0], [2, 0]], "finite.*row 1"),
         ([[0, 0, 0]] * 4, r"shape \(N, 2\)"),
         ([1, 2, 3], r"shape \(N, 2\)"),
     ],

@@ -18,7 +18,7 @@ Their evidence is
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import gammaln
+import scipy
 
 START, END, FIRST = 0, 1, 2  # nodes of every graph: the start, the end, then the states
 LEAST_GAIN = 1e-9  # nats: a smaller gain of evidence is rounding, not a reason
@@ -84,7 +84,7 @@ def emission_table(prior, n_most):
     """The part of the emission evidence that depends on n alone, for n = 0 .. n_most."""
     n = np.arange(n_most + 1)
     nu = prior.nu + np.array([0, *n])
-    gammas = gammaln(nu / 2) + gammaln((nu - 1) / 2)
+    gammas = scipy.special.gammaln(nu / 2) + scipy.special.gammaln((nu - 1) / 2)
     return gammas[1:] - gammas[0] - n * np.log(np.pi) + prior.nu * np.log(prior.psi) - np.log1p(n / prior.kappa)
 
 
@@ -101,7 +101,7 @@ def emission_evidence(n, s, q, prior, table):
 def transition_evidence(counts):
     """Evidence of the edges that leave each node (S,), in nats."""
     total, out = counts.sum(1), np.maximum((counts > 0).sum(1), 1)
-    return gammaln(out) - gammaln(out + total) + gammaln(counts + 1).sum(1)
+    return scipy.special.gammaln(out) - scipy.special.gammaln(out + total) + scipy.special.gammaln(counts + 1).sum(1)
 
 
 def graph_of(labels, chains):

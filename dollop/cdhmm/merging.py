@@ -7,7 +7,7 @@ The gain of every pair stands in a matrix, of which a merge renews only the rows
 import heapq
 
 import numpy as np
-from scipy.special import gammaln
+import scipy
 
 from dollop.cdhmm.evidence import FIRST, LEAST_GAIN, emission_evidence, emission_table, graph_of
 
@@ -32,7 +32,7 @@ class Merging:
         self.n, self.s, self.q, self.counts = graph.n, graph.s, graph.q, graph.counts
         self.names = np.arange(len(self.n))
         self.table = emission_table(prior, 2 * len(labels))
-        self.log_factorial = gammaln(np.arange(4 * len(labels) + 1) + 1.0)
+        self.log_factorial = scipy.special.gammaln(np.arange(4 * len(labels) + 1) + 1.0)
         self.reaches = reachability(self.counts)
         self.blocked = self.reaches | self.reaches.T
         self._compute_all()

@@ -16,7 +16,7 @@ from itertools import pairwise
 from operator import add
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from dollop.cdhmm.alignment import (
     LEAST_COVERAGE,
@@ -40,9 +40,9 @@ from dollop.cdhmm.evidence import (
     outer_products,
     prior_over,
 )
+from dollop.checks import check_positive, checked_positions
 
 LEAST_SPREAD, MOST_SPREAD = 1e-6, 1e6  # m: beyond, the evidence drowns in rounding
-FARTHEST = 1e9  # m: so far from the origin a place may lie
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +121,7 @@ class SubgoalHMM:
         sequences = tuple(checked_sequence(sequence, f"demonstration {k}") for k, sequence in enumerate(sequences))
         if not sequences:
             raise ValueError("sequences must hold at least one demonstration, got none")
-        if not 0 < spread < np.inf:
-            raise ValueError(f"spread must be positive and finite, got {spread}")
+        check_positive("spread", spread)
         if not LEAST_SPREAD <= spread <= MOST_SPREAD:
             raise ValueError(f"spread must lie between {LEAST_SPREAD:g} and {MOST_SPREAD:g} m, got {spread}")
         chains = chains_of(sequences)
@@ -276,8 +275,8 @@ class SubgoalHMM:
             start, steps, end = np.log(self.start), np.log(self.transitions), np.log(self.end)
         forward = start + emissions[0]
         for emission in emissions[1:]:
-            forward = logsumexp(forward[:, None] + steps, axis=0) + emission
-        return float(logsumexp(forward + end))
+            forward = scipy.special.logsumexp(forward[:, None] + steps, axis=0) + emission
+        return float(scipy.special.logsumexp(forward + end))
 
     def _grown(self):
         """The chains again, the graph of their states, and the mean place of its nodes."""
@@ -304,11 +303,7 @@ def log_normal(points, means, covariances):
 
 def checked_sequence(sequence, name):
     """Subgoals as a float array (K, 2), in m; ValueError that calls them `name` if they are none."""
-    sequence = np.array(sequence, float)
-    if sequence.ndim != 2 or sequence.shape[1] != 2 or not len(sequence):
-        raise ValueError(f"{name} must hold at least one subgoal, as (K, 2), got shape {sequence.shape}")
-    if not np.isfinite(sequence).all():
-        raise ValueError(f"{name} must be finite, got {sequence[~np.isfinite(sequence).all(1)][0]}")
-    if np.abs(sequence).max() > FARTHEST:
-        raise ValueError(f"{name} must lie within {FARTHEST:g} m of the origin, got {np.abs(sequence).max():g} m")
+    sequence = checked_positions(name, sequence)
+    if not len(sequence):
+        raise ValueError(f"{name} must hold at least one subgoal, as (K, 2), got none")
     return sequence

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dollop.formats import carmen
+from dollop.formats import carmen_log
 from dollop.formats.files import FormatError
 
 CARMEN_SUFFIXES = (".log", ".log.gz", ".clf", ".clf.gz")
@@ -15,7 +15,7 @@ def read_log(path, topic=None):
     Parameters
     ----------
     path : str or Path
-        `.log`, `.log.gz`, `.clf`: a CARMEN log (`dollop.formats.carmen.read_log`); `.bag`, `.mcap`
+        `.log`, `.log.gz`, `.clf`: a CARMEN log (`dollop.formats.carmen_log.read_log`); `.bag`, `.mcap`
         or the folder of a ROS 2 bag: a ROS bag (`dollop.formats.ros_bag.read_log`, which needs the
         extra `ros`). A bag's poses are all (0, 0, 0): if the sensor moved, give the log its poses
         in the map with `dataclasses.replace(log, poses=poses)`.
@@ -43,7 +43,7 @@ def read_log(path, topic=None):
     _check_is_carmen(path)
     if topic is not None:
         raise ValueError(f"a CARMEN log has no topics, got topic={topic!r}")
-    return carmen.read_log(path)
+    return carmen_log.read_log(path)
 
 
 def write_log(path, log):
@@ -57,7 +57,7 @@ def write_log(path, log):
         The scans, with evenly spaced beams.
     """
     _check_is_carmen(Path(path))
-    carmen.write_log(path, log)
+    carmen_log.write_log(path, log)
 
 
 def _check_is_carmen(path):

@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 from PIL import Image
 
-from dollop.formats.carmen import OCCUPIED_FROM
+from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, read_bytes, whole_file
 
 UNKNOWN_GREY = (127, 128)

@@ -6,8 +6,9 @@ import numpy as np
 
 from dollop.lab.sick import SickLMS200
 from dollop.lab.world import PHYSICS_RATE, pybullet
-from dollop.robot.control import PIONEER_LIMITS, Limits, wrap
-from dollop.robot.localization import MonteCarloLocalizer, motion_between
+from dollop.pose import motion_between, moved_pose
+from dollop.robot.control import PIONEER_LIMITS, Limits
+from dollop.robot.localization import MonteCarloLocalizer
 
 __all__ = ["Pioneer", "laser_pose"]
 
@@ -202,19 +203,6 @@ class Pioneer:
         self._turned = turned
         turn = (right - left) / self._believed_base
         self.odometry = moved_pose(self.odometry, (left + right) / 2, turn)
-
-
-def moved_pose(pose, distance, turn):
-    """The pose after a short arc of `distance` m that turns by `turn` rad.
-
-    Examples
-    --------
-    >>> moved_pose(np.zeros(3), 1.0, 0.0).tolist()
-    [1.0, 0.0, 0.0]
-    """
-    x, y, theta = pose
-    middle = theta + turn / 2
-    return np.array([x + distance * np.cos(middle), y + distance * np.sin(middle), wrap(theta + turn)])
 
 
 def laser_pose(pose):

@@ -10,7 +10,8 @@ from dollop.lab.scenes import empty_scene, figure_eight_scene
 from dollop.lab.sick import SickLMS200
 from dollop.lab.world import World
 from dollop.laser import LaserLog
-from dollop.robot.control import PIONEER_LIMITS, wrap
+from dollop.pose import wrapped
+from dollop.robot.control import PIONEER_LIMITS
 
 TOUR = (
     (4.5, 2.6),
@@ -58,7 +59,7 @@ def record(scene, walk, seed, sick=None, legs=False):
             world.place_person(*state)
             ranges.append(sick.scan(world, pose, rng))
     log = LaserLog(t, np.array(ranges), sick.angles, np.tile(pose, (len(t), 1)), sick.max_range)
-    rows = [(time, *position, wrap(heading)) for time, (position, heading, _) in zip(t, states, strict=True)]
+    rows = [(time, *position, wrapped(heading)) for time, (position, heading, _) in zip(t, states, strict=True)]
     return Recording(log, pd.DataFrame(rows, columns=TRUTH_COLUMNS), scene)
 
 
@@ -140,5 +141,5 @@ def record_background(seed, sick=None):
 def pursue(pose, goal, speed=0.5, gain=1.5):
     """Speed in m/s and turning rate in rad/s towards a goal (2,), slower the farther it lies off the heading."""
     x, y, theta = pose
-    error = wrap(np.arctan2(goal[1] - y, goal[0] - x) - theta)
+    error = wrapped(np.arctan2(goal[1] - y, goal[0] - x) - theta)
     return speed * max(np.cos(error), 0.0) ** 2, gain * error

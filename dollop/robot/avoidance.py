@@ -18,9 +18,9 @@ from functools import cached_property
 from math import cos, hypot, inf, sin, sqrt
 
 import numpy as np
-from scipy import ndimage
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
+import scipy
+
+from dollop.gridmap import covered_cells, in_cells, in_metres
 
 ROBOT_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
@@ -113,8 +113,9 @@ class ObstacleMap:
         centres.
         """
         rows, columns = self.distances.shape
-        across = min(max((x - self.origin[0]) / self.resolution - 0.5, 0.0), columns - 1.001)
-        up = min(max((y - self.origin[1]) / self.resolution - 0.5, 0.0), rows - 1.001)
+        across, up = in_cells(x, y, self.origin, self.resolution)
+        across = min(max(across - 0.5, 0.0), columns - 1.001)
+        up = min(max(up - 0.5, 0.0), rows - 1.001)
         column, row = int(across), int(up)
         right, top = across - column, up - row
         corner, lookup = row * columns + column, self.lookup
@@ -131,14 +132,15 @@ class ObstacleMap:
 
     def edges(self, positions):
         """`edge` for (N, 2) positions in m at once: (N,)."""
-        at = (np.asarray(positions)[:, ::-1] - np.array(self.origin)[::-1]) / self.resolution - 0.5
-        return ndimage.map_coordinates(self.distances, at.T, order=1, mode="nearest") - self.radius
+        across, up = in_cells(*np.asarray(positions).T, self.origin, self.resolution)
+        at = np.stack([up, across]) - 0.5
+        return scipy.ndimage.map_coordinates(self.distances, at, order=1, mode="nearest") - self.radius
 
     def holds(self, x, y):
         """Whether x, y in m lies on the map."""
         rows, columns = self.distances.shape
-        side = self.resolution
-        return 0 <= x - self.origin[0] < columns * side and 0 <= y - self.origin[1] < rows * side
+        across, up = in_cells(x, y, self.origin, self.resolution)
+        return 0 <= across < columns and 0 <= up < rows
 
     def modulate(self, x, y, ux, uy):
         """The direction (ux, uy) of a law at x, y in m, turned along what is near; unchanged where
@@ -176,7 +178,7 @@ class ObstacleMap:
     @cached_property
     def nearest_passable(self):
         """Flat index of the passable cell nearest to each cell, as a list."""
-        row, column = ndimage.distance_transform_edt(~self.passable, return_distances=False, return_indices=True)
+        row, column = scipy.ndimage.distance_transform_edt(~self.passable, return_distances=False, return_indices=True)
         return (row * self.distances.shape[1] + column).ravel().tolist()
 
     @cached_property
@@ -194,21 +196,21 @@ class ObstacleMap:
             heads.append(index[here][both])
             tails.append(index[there][both])
             costs.append(hypot(down, right) * (cost[here] + cost[there])[both] / 2)
-        return coo_array(
+        return scipy.sparse.coo_array(
             (np.concatenate(costs), (np.concatenate(heads), np.concatenate(tails))), shape=(index.size, index.size)
         ).tocsr()
 
     def cell(self, x, y):
         """Flat index of the passable cell nearest to x, y in m."""
         rows, columns = self.distances.shape
-        column = min(max(int((x - self.origin[0]) / self.resolution), 0), columns - 1)
-        row = min(max(int((y - self.origin[1]) / self.resolution), 0), rows - 1)
+        across, up = in_cells(x, y, self.origin, self.resolution)
+        column, row = min(max(int(across), 0), columns - 1), min(max(int(up), 0), rows - 1)
         return self.nearest_passable[row * columns + column]
 
     def centre(self, cell):
         """x, y in m of the centre of the cell with flat index `cell`."""
         row, column = divmod(cell, self.distances.shape[1])
-        return self.origin[0] + (column + 0.5) * self.resolution, self.origin[1] + (row + 0.5) * self.resolution
+        return in_metres(column + 0.5, row + 0.5, self.origin, self.resolution)
 
 
 class Geodesic:
@@ -226,7 +228,7 @@ class Geodesic:
         self.obstacles = obstacles
         self.goal_cell = obstacles.cell(*goal)
         self.goal = obstacles.centre(self.goal_cell)
-        distances, before = dijkstra(
+        distances, before = scipy.sparse.csgraph.dijkstra(
             obstacles.neighbours, directed=False, indices=self.goal_cell, return_predecessors=True
         )
         self.distances, self.before = distances.tolist(), before.tolist()
@@ -275,22 +277,12 @@ def open_frame(boxes, places, resolution):
     return tuple(low.tolist()), (rows, columns)
 
 
-def covered_cells(boxes, origin, resolution, shape):
-    """(H, W) bool array: cells that one of the boxes (N, 4) reaches into."""
-    covered = np.zeros(shape, dtype=bool)
-    low = np.floor((boxes[:, :2] - origin) / resolution + 1e-9).astype(int).clip(0)
-    high = np.ceil((boxes[:, 2:] - origin) / resolution - 1e-9).astype(int).clip(0)
-    for (left, bottom), (right, top) in zip(low, high, strict=True):
-        covered[bottom:top, left:right] = True
-    return covered
-
-
 def signed_distance(blocked, resolution):
     """From the centre of each cell to the edge of what is blocked, in m, negative inside; far where
     nothing is.
     """
     if not blocked.any():
         return np.full(blocked.shape, 1e3)
-    outside = ndimage.distance_transform_edt(~blocked)
-    inside = ndimage.distance_transform_edt(blocked)
+    outside = scipy.ndimage.distance_transform_edt(~blocked)
+    inside = scipy.ndimage.distance_transform_edt(blocked)
     return resolution * (outside - inside - np.where(blocked, -0.5, 0.5))

@@ -18,11 +18,12 @@ The paper gives neither the rule of handing over nor a controller: both are reco
 """
 
 from collections import namedtuple
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, sin
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
+import scipy
 
+from dollop.pose import wrapped
 from dollop.robot.avoidance import Geodesic
 
 REACH = 0.25
@@ -67,11 +68,6 @@ def clip(value, limit):
     return max(-limit, min(limit, value))
 
 
-def wrap(angle):
-    """The angle in rad, in (-pi, pi]."""
-    return pi - (pi - angle) % (2 * pi)
-
-
 class Guidance:
     """The direction of a sequenced LDS at any state, round obstacles if it is given any.
 
@@ -91,7 +87,9 @@ class Guidance:
         self.obstacles = obstacles
         self.goals = [tuple(segment.goal.tolist()) for segment in law.segments]
         self.steps = [(segment.A - np.eye(2)).ravel().tolist() for segment in law.segments]
-        self.weights = [solve_discrete_lyapunov(s.A.T, np.eye(2))[[0, 0, 1], [0, 1, 1]].tolist() for s in law.segments]
+        self.weights = [
+            scipy.linalg.solve_discrete_lyapunov(s.A.T, np.eye(2))[[0, 0, 1], [0, 1, 1]].tolist() for s in law.segments
+        ]
         self.detours, self.geodesics = {}, {}
 
     def direction(self, k, x, y):
@@ -195,6 +193,11 @@ class Guidance:
         return places, segments
 
 
+def lyapunov_weights(A):
+    """p, q, r of the P = [[p, q], [q, r]] that solves A^T P A - P = -I."""
+    return scipy.linalg.solve_discrete_lyapunov(A.T, np.eye(2))[[0, 0, 1], [0, 1, 1]].tolist()
+
+
 class Supervisor:
     """Which segment is in force, and whether the robot gets on with it.
 
@@ -278,7 +281,7 @@ class Plain(Supervisor):
         ux, uy = self.guidance.direction(self.active, x, y)
         if ux == uy == 0.0:
             return 0.0, 0.0
-        error = wrap(atan2(uy, ux) - theta)
+        error = wrapped(atan2(uy, ux) - theta)
         speed = 0.0 if abs(error) > SHARP else self.speeds[self.active] * self.pace * cos(error)
         return self.safe(speed, x, y, theta), clip(TURN_GAIN * error, self.limits.turn)
 
@@ -312,7 +315,7 @@ class Pursuit(Supervisor):
             self.plan(x, y)
         self.advance(x, y)
         ahead_x, ahead_y = self.pursued(x, y)
-        error = wrap(atan2(ahead_y - y, ahead_x - x) - theta)
+        error = wrapped(atan2(ahead_y - y, ahead_x - x) - theta)
         curvature = 2 * sin(error) / max(hypot(ahead_x - x, ahead_y - y), STEP)
         speed = self.pace * min(self.planned[self.at], self.limits.turn / max(abs(curvature), 1e-9))
         speed = self.safe(speed, x, y, theta)

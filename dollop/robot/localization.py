@@ -21,9 +21,11 @@ half a turn.
 from math import pi
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
-from dollop.robot.avoidance import FREE_BELOW, covered_cells
+from dollop.gridmap import covered_cells, in_cells
+from dollop.pose import rotation
+from dollop.robot.avoidance import FREE_BELOW
 
 SIGMA, WIDE_SIGMA = 0.10, 0.20
 """Standard deviation in m of the likelihood field: for particles, and for a lattice, which misses
@@ -97,8 +99,8 @@ class MonteCarloLocalizer:
         free = (background.occupancy < FREE_BELOW) & ~blocked
         if not free.any():
             raise ValueError("the background must have a free cell for the robot to be in, got none")
-        surface = blocked & ~ndimage.binary_erosion(blocked, border_value=1)  # no beam ends inside what is solid
-        distances = ndimage.distance_transform_edt(~surface, sampling=background.resolution)
+        surface = blocked & ~scipy.ndimage.binary_erosion(blocked, border_value=1)  # no beam ends inside what is solid
+        distances = scipy.ndimage.distance_transform_edt(~surface, sampling=background.resolution)
         self.field = LikelihoodField(distances, SIGMA, background.origin, background.resolution)
         self.wide_field = LikelihoodField(distances, WIDE_SIGMA, background.origin, background.resolution)
         self.lattice = lattice(free, background)
@@ -133,7 +135,7 @@ class MonteCarloLocalizer:
         Parameters
         ----------
         motion : (3,) sequence of float
-            By odometry, as `motion_between` has it.
+            By odometry, as `dollop.pose.motion_between` has it.
         ranges : (B,) array
             The scan after it in m, `inf` where nothing came back.
         """
@@ -236,16 +238,17 @@ class LikelihoodField:
         which is faster.
         """
         here = self.cells(np.column_stack([places, np.zeros(len(places))]), np.zeros((1, 2)))
-        there = np.rint(self.within_reach(ends) @ turn_matrix(heading).T / self.resolution).astype(np.int32)
+        there = np.rint(self.within_reach(ends) @ rotation(heading).T / self.resolution).astype(np.int32)
         return self.log_table[here + (there[:, 1] * self.columns + there[:, 0])].sum(axis=1)
 
     def cells(self, poses, ends):
         """Flat index (N, M) of the cell where each beam ends."""
-        places = (poses[:, :2].clip(self.low, self.high) - self.origin) / self.resolution
+        places = poses[:, :2].clip(self.low, self.high)
+        column, row = in_cells(places[:, :1], places[:, 1:], self.origin, self.resolution)
         cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
         ahead, left = self.within_reach(ends).T / self.resolution
-        columns = (places[:, :1] + cos * ahead - sin * left).astype(np.int32)
-        rows = (places[:, 1:] + sin * ahead + cos * left).astype(np.int32)
+        columns = (column + cos * ahead - sin * left).astype(np.int32)
+        rows = (row + sin * ahead + cos * left).astype(np.int32)
         return rows * self.columns + columns
 
     def within_reach(self, ends):
@@ -277,25 +280,6 @@ def moved_particles(particles, motion, rng):
     moved[:, 0] = particles[:, 0] + np.cos(middle) * steps[:, 0] - np.sin(middle) * steps[:, 1]
     moved[:, 1] = particles[:, 1] + np.sin(middle) * steps[:, 0] + np.cos(middle) * steps[:, 1]
     return moved
-
-
-def motion_between(before, after):
-    """What happened between two poses (3,) of the odometry: m ahead and to the left, seen from half
-    the turn, and rad.
-
-    Examples
-    --------
-    >>> motion_between((1.0, 1.0, np.pi / 2), (1.0, 3.0, np.pi / 2)).round(6).tolist()
-    [2.0, 0.0, 0.0]
-    """
-    dx, dy, turn = np.subtract(after, before)
-    turn = pi - (pi - turn) % (2 * pi)
-    return np.array([*(turn_matrix(-before[2] - turn / 2) @ (dx, dy)), turn])
-
-
-def turn_matrix(angle):
-    """Rotation by an angle in rad: (2, 2)."""
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
 def softmax(scores):

@@ -11,8 +11,10 @@ from math import cos, isfinite, sin
 
 import numpy as np
 
+from dollop.checks import check_choice
+from dollop.pose import wrapped
 from dollop.robot.avoidance import Geodesic, ObstacleMap
-from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits, clip, wrap
+from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits, clip
 from dollop.trajectory import distance_to_polyline
 
 SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
@@ -108,7 +110,7 @@ class Unicycle:
         x, y, theta = self.pose
         middle = theta + self.turn * period / 2
         way = self.speed * period
-        self.pose = x + way * cos(middle), y + way * sin(middle), wrap(theta + self.turn * period)
+        self.pose = x + way * cos(middle), y + way * sin(middle), wrapped(theta + self.turn * period)
 
 
 def approach(value, goal, step):
@@ -159,8 +161,7 @@ def perform(
         For an unknown control law, a start, subgoal or kidnapping that is not finite, off the map
         or in an obstacle, a time-out that is not positive, or a kidnapping before the start.
     """
-    if control not in CONTROL_LAWS:
-        raise ValueError(f"control must be one of {sorted(CONTROL_LAWS)}, got {control!r}")
+    check_choice("control", control, CONTROL_LAWS)
     if not (timeout > 0 and localise_within > 0):
         raise ValueError(f"timeout and localise_within must be positive, got {timeout} and {localise_within}")
     kidnap = sorted((float(time), tuple(pose)) for time, pose in kidnap)

@@ -12,7 +12,8 @@ from dollop.lab.sick import SCAN_RATES, SickLMS200, mix_pixels
 pytest.importorskip("pybullet", reason="the laboratory needs PyBullet (extra `lab`)")
 
 from dollop.lab.person import DEPTH, SHOULDERS, figure_eight
-from dollop.lab.pioneer import Pioneer, laser_pose, moved_pose
+from dollop.lab.pioneer import Pioneer, laser_pose
+from dollop.pose import moved_pose
 from dollop.lab.sick import cast
 from dollop.lab.simulate import record, record_background, record_figure_eights
 from dollop.lab.world import Server, World

@@ -9,8 +9,9 @@ from rooms import figure_eight_task
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.lds import LDS, Statistics
+from dollop.pose import wrapped
 from dollop.robot.avoidance import ObstacleMap
-from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, REACH, STEP, Guidance, Limits, bend_speeds, clip, wrap
+from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, REACH, STEP, Guidance, Limits, bend_speeds, clip
 from dollop.robot.performing import Unicycle
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import distance_to_polyline
@@ -60,8 +61,8 @@ def drive(law, control, pose, limit=4000):
 
 def test_wrap_and_clip():
     """Angles come into (-pi, pi], values into their limits."""
-    assert wrap(np.pi) == np.pi and wrap(-np.pi) == np.pi
-    assert wrap(7.0) == pytest.approx(7.0 - 2 * np.pi)
+    assert wrapped(np.pi) == np.pi and wrapped(-np.pi) == np.pi
+    assert wrapped(7.0) == pytest.approx(7.0 - 2 * np.pi)
     assert (clip(3.0, 2.0), clip(-3.0, 2.0), clip(1.0, 2.0)) == (2.0, -2.0, 1.0)
 
 

@@ -6,6 +6,7 @@ from rooms import ANGLES, CANS, FURNITURE, WALLS, drawn_map, room_map, scan
 
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
+from dollop.pose import motion_between
 from dollop.robot.localization import (
     BELIEVED_AFTER,
     FLOOR,
@@ -16,7 +17,6 @@ from dollop.robot.localization import (
     MonteCarloLocalizer,
     lattice,
     mean_pose,
-    motion_between,
     moved_particles,
     softmax,
 )

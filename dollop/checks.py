@@ -1,0 +1,117 @@
+"""What is asked of numbers and arrays that come from outside: errors name the value and the rule."""
+
+import numpy as np
+
+__all__ = ["FARTHEST", "check_choice", "check_positive", "checked_array", "checked_positions"]
+
+FARTHEST = 1e9
+"""m from the origin: coordinates beyond are no metres, and their squares would overflow."""
+
+
+def check_positive(name, value, or_zero=False):
+    """Refuse a number that is negative, infinite or NaN, or zero unless that is allowed.
+
+    Parameters
+    ----------
+    name : str
+        What to call it in the error.
+    value : float
+    or_zero : bool
+
+    Raises
+    ------
+    ValueError
+    """
+    if not (0 < value < np.inf or (or_zero and value == 0)):
+        rule = "finite and not negative" if or_zero else "positive and finite"
+        raise ValueError(f"{name} must be {rule}, got {value}")
+
+
+def check_choice(name, value, known):
+    """Refuse a choice that is none of the known ones.
+
+    Parameters
+    ----------
+    name : str
+        What to call it in the error.
+    value : object
+    known : iterable of str
+
+    Raises
+    ------
+    ValueError
+
+    Examples
+    --------
+    >>> check_choice("control", "plane", ["plain", "pursuit"])
+    Traceback (most recent call last):
+    ValueError: control must be one of 'plain', 'pursuit', got 'plane'
+    """
+    if value not in known:
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}, got {value!r}")
+
+
+def checked_array(name, values, *shape, finite=True):
+    """Values as a float array of their own, if their shape is the one wanted and all are finite.
+
+    Parameters
+    ----------
+    name : str
+        What to call it in the error.
+    values : array_like
+    *shape : int or str
+        The size wanted along each axis; a letter stands for any.
+    finite : bool
+        Whether infinity and NaN are refused.
+
+    Returns
+    -------
+    float array
+        A copy.
+
+    Raises
+    ------
+    ValueError
+
+    Examples
+    --------
+    >>> checked_array("boxes", [[0, 0, 1]], "N", 4)
+    Traceback (most recent call last):
+    ValueError: boxes must have shape (N, 4), got (1, 3)
+    """
+    array = np.array(values, dtype=float)
+    sizes = zip(shape, array.shape, strict=False)
+    if array.ndim != len(shape) or any(n != m for n, m in sizes if not isinstance(n, str)):
+        wanted = f"({shape[0]},)" if len(shape) == 1 else f"({', '.join(map(str, shape))})"
+        raise ValueError(f"{name} must have shape {wanted}, got {array.shape}")
+    if finite and not np.isfinite(array).all():
+        row = np.argwhere(~np.isfinite(array))[0, 0]
+        raise ValueError(f"{name} must be finite, got {array[row].tolist()} in row {row}")
+    return array
+
+
+def checked_positions(name, values):
+    """Positions in the plane as a float array of their own.
+
+    Parameters
+    ----------
+    name : str
+        What to call them in the error.
+    values : (N, 2) array_like
+        In m.
+
+    Returns
+    -------
+    (N, 2) float array
+
+    Raises
+    ------
+    ValueError
+        Another shape, a value that is not finite, or farther than 1e9 m from the origin.
+    """
+    positions = checked_array(name, values, "N", 2)
+    farthest = np.abs(positions).max(initial=0)
+    if farthest > FARTHEST:
+        rule = f"must lie within {FARTHEST:g} m of the origin"
+        raise ValueError(f"{name} {rule}, got {farthest:g} m")
+    return positions

@@ -1,0 +1,116 @@
+"""CARMEN's map files, the occupancy grids of the paper's toolkit [6] (`map_io.h` of CARMEN 0.7)."""
+
+import re
+import struct
+
+import numpy as np
+
+from dollop.formats.files import FormatError, read_bytes, whole_file
+
+__all__ = ["OCCUPIED_FROM", "read_map", "write_map"]
+
+OCCUPIED_FROM = 0.5
+"""Probability from which a cell is occupied (`occupied_prob` in CARMEN's parameters)."""
+
+MAP_LABEL = b"CARMENMAPFILEv020"
+GRIDMAP_CHUNK, NAMED_CHUNK = 1, 128
+
+
+def read_map(path):
+    """Occupancy of a CARMEN map file (`CARMENMAPFILE`, version v020), plain or gzipped.
+
+    After comment lines and the label the file is a sequence of chunks: one byte of type, four of
+    size, then ten of description. The gridmap chunk holds two int32 sizes, a float32 resolution and
+    the float32 probabilities, x-major; -1 is unknown. Index times resolution is the world
+    coordinate of a cell's *centre* (`carmen_map_to_world`).
+
+    Parameters
+    ----------
+    path : str or Path
+        The map.
+
+    Returns
+    -------
+    occupancy : (H, W) float array
+        Indexed [y, x], NaN where unknown.
+    origin : (float, float)
+        Lower left cell's corner, in m: half a cell below zero, unless the map was written by
+        `write_map`.
+    resolution : float
+        Metres per cell.
+
+    Raises
+    ------
+    FormatError
+        If label, chunks, sizes or probabilities are not what they should be.
+    """
+    content = read_bytes(path)
+    start = content.find(MAP_LABEL)
+    if start < 0 or not all(line[:1] in (b"#", b"") for line in content[:start].split(b"\n")):
+        raise FormatError(f"no {MAP_LABEL.decode()} after the comment lines", path)
+    body = _gridmap_chunk(path, content, start + len(MAP_LABEL))
+    if len(body) < 12:
+        raise FormatError("the gridmap chunk is cut short", path)
+    width, height, resolution = struct.unpack_from("<iif", body)
+    if not (width > 0 and height > 0 and 0 < resolution < np.inf and len(body) == 12 + 4 * width * height):
+        raise FormatError(f"{width} x {height} cells of {resolution} m do not fit a chunk of {len(body)} bytes", path)
+    # float32 turns 0.1 into 0.10000000149; seven digits are all it holds.
+    resolution = float(f"{resolution:.7g}")
+    occupancy = np.frombuffer(body, "<f4", offset=12).reshape(width, height).T.astype(float)
+    wrong = ~((occupancy == -1) | ((occupancy >= 0) & (occupancy <= 1)))
+    if wrong.any():
+        raise FormatError(f"an occupancy must be in [0, 1], or -1 where unknown, got {occupancy[wrong][0]}", path)
+    occupancy[occupancy == -1] = np.nan
+    return occupancy, _map_origin(path, content[:start], resolution), resolution
+
+
+def _gridmap_chunk(path, content, place):
+    """Content of the first gridmap chunk, without its description and name."""
+    while place + 5 <= len(content):
+        kind, size = struct.unpack_from("<Bi", content, place)
+        if size < 0 or place + 5 + size > len(content):
+            raise FormatError(f"a chunk of {size} bytes at byte {place} runs past the end of the file", path)
+        chunk = content[place + 15 : place + 5 + size]
+        if kind & ~NAMED_CHUNK == GRIDMAP_CHUNK:
+            return chunk.partition(b"\0")[2] if kind & NAMED_CHUNK else chunk
+        place += 5 + size
+    raise FormatError("no gridmap chunk in the file", path)
+
+
+def _map_origin(path, comments, resolution):
+    found = re.search(rb"^# Lower left    : (.*)$", comments, re.MULTILINE)
+    if not found:
+        return -resolution / 2, -resolution / 2
+    try:
+        x, y = (float(value) for value in found[1].split())
+    except ValueError:
+        raise FormatError(f"the lower left corner must be two numbers, got {found[1]!r}", path) from None
+    return x, y
+
+
+def write_map(path, occupancy, origin, resolution):
+    """Write an occupancy grid as a CARMEN map file; see `read_map`.
+
+    CARMEN's map frame begins at the centre of the lower left cell. Where the grid lies otherwise,
+    its place is kept in a comment line of the head, which `read_map` honours and CARMEN passes
+    over.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; it appears whole or not at all.
+    occupancy : (H, W) float array
+        Probabilities in [0, 1], NaN where unknown.
+    origin : (float, float)
+        Lower left cell's corner, in m.
+    resolution : float
+        Metres per cell.
+    """
+    height, width = occupancy.shape
+    cells = np.where(np.isnan(occupancy), -1, occupancy).T.astype("<f4").tobytes()
+    chunk = b"GRIDMAP   " + struct.pack("<iif", width, height, resolution) + cells
+    head = f"# Map size      : {width} x {height}\n# Resolution    : {resolution:g}\n"
+    head += f"# Lower left    : {float(origin[0])!r} {float(origin[1])!r}\n"
+    with whole_file(path) as stream:
+        stream.write(b"# Carnegie Mellon Robot Toolkit (CARMEN) map file\n" + head.encode() + MAP_LABEL)
+        stream.write(struct.pack("<Bi", GRIDMAP_CHUNK, len(chunk)) + chunk)

@@ -1,0 +1,75 @@
+"""CARMEN maps."""
+
+import gzip
+import os
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dollop.formats import carmen_map
+from dollop.formats.files import FormatError
+
+external = pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA is not set")
+
+
+def map_file(cells, chunks=b"", kind=1, name=b"", size=None):
+    """A map file as CARMEN writes it, of (width, height) cells of 0.1 m."""
+    width, height = cells.shape
+    chunk = b"GRIDMAP   " + name + struct.pack("<iif", width, height, 0.1) + cells.astype("<f4").tobytes()
+    head = b"# Map size : 2 x 3\n#\nCARMENMAPFILEv020"
+    return head + chunks + struct.pack("<Bi", kind, len(chunk) if size is None else size) + chunk
+
+
+CELLS = np.array([[0.0, 0.5, -1.0], [1.0, 0.25, 0.75]])
+
+
+def test_map_is_read_by_rows_of_y(tmp_path):
+    """Cell [x][y] of the file is row y, column x; -1 is unknown; other chunks and the chunk's name are passed over."""
+    other = struct.pack("<Bi", 32, 4) + b"abcd"
+    for content in (map_file(CELLS, other), gzip.compress(map_file(CELLS, kind=129, name=b"floor\0"))):
+        (tmp_path / "a.map").write_bytes(content)
+        occupancy, origin, resolution = carmen_map.read_map(tmp_path / "a.map")
+        np.testing.assert_array_equal(occupancy, [[0.0, 1.0], [0.5, 0.25], [np.nan, 0.75]])
+        assert resolution == 0.1 and origin == (-0.05, -0.05)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (map_file(CELLS)[:-3], "runs past the end"),
+        (map_file(CELLS, size=20), "cut short|do not fit"),
+        (map_file(CELLS, size=-20), "runs past the end"),
+        (map_file(CELLS, kind=2), "no gridmap chunk"),
+        (map_file(CELLS + 1), r"must be in \[0, 1\]"),
+        (map_file(CELLS * np.nan), r"must be in \[0, 1\]"),
+        (b"# a comment\nP5 3 3 255\n", "no CARMENMAPFILEv020"),
+        (b"FLASER 1\nCARMENMAPFILEv020", "no CARMENMAPFILEv020"),
+        (b"CARMENMAPFILEv020", "no gridmap chunk"),
+    ],
+)
+def test_what_is_no_map(tmp_path, content, message):
+    """Cut off, mislabelled and impossible maps give a FormatError that says what is wrong."""
+    (tmp_path / "a.map").write_bytes(content)
+    with pytest.raises(FormatError, match=message):
+        carmen_map.read_map(tmp_path / "a.map")
+
+
+@external
+@pytest.mark.parametrize(("name", "shape"), [("wean5300", (326, 657)), ("thickwean", (170, 477))])
+def test_real_maps(name, shape):
+    """The maps of the paper's own era are read: decimetre cells, mostly unknown, a few per cent occupied."""
+    path = Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / f"carmen_maps/{name}.map"
+    occupancy, _, resolution = carmen_map.read_map(path)
+    assert occupancy.shape == shape and resolution == 0.1
+    assert 0.7 < np.isnan(occupancy).mean() < 0.9 and 0.02 < (occupancy >= 0.5).mean() < 0.1
+
+
+def test_a_written_map_is_read_back_in_place(tmp_path):
+    """Rows stay rows, and the corner of a map that is wider than high comes back x before y."""
+    occupancy = np.array([[0.0, 0.5, np.nan], [1.0, 0.25, 0.75]])
+    carmen_map.write_map(tmp_path / "a.map", occupancy, (1.5, -2.0), 0.1)
+    read, origin, resolution = carmen_map.read_map(tmp_path / "a.map")
+    np.testing.assert_array_equal(read, occupancy)
+    assert origin == (1.5, -2.0) and resolution == 0.1
