@@ -1,7 +1,8 @@
-"""A person walking a task: via-points that differ in every lap, a smooth path, a human speed, a swaying gait.
+"""A person walking a task: via-points that differ in every lap, a smooth path, human speed and gait.
 
-The walk is made from geometry and noise, never from a dynamical system: what is later fitted to it is not what made it.
-Nothing here needs PyBullet.
+The walk is made from geometry and noise, never from a dynamical system: what is later fitted to it
+is not what made it. It is a reconstruction: the paper says no more than that a user walked several
+figure-eights (Sec. II). Nothing here needs PyBullet.
 """
 
 from dataclasses import dataclass
@@ -13,6 +14,17 @@ from scipy.ndimage import gaussian_filter1d
 from dollop.lab.scenes import background_distance
 from dollop.trajectory import arc_length, resample
 
+__all__ = [
+    "DEPTH",
+    "SHOULDERS",
+    "STRIDE_RATE",
+    "Walk",
+    "figure_eight",
+    "slalom",
+    "smooth_path",
+    "walk",
+]
+
 SHOULDERS = 0.45
 """Width of the body across the shoulders in m."""
 DEPTH = 0.25
@@ -20,12 +32,13 @@ DEPTH = 0.25
 CLEARANCE = 0.10
 """Least distance in m that a person keeps between shoulder and foreground object."""
 BACKGROUND_CLEARANCE = 0.30
-"""Least distance in m between shoulder and background: the background radius of Sec. II swallows what is nearer."""
+"""Least distance in m, shoulder to background: the radius of Sec. II swallows what is nearer."""
 STRIDE_RATE = 0.9
 """Strides (two steps) per second."""
 
 TIME_STEP = 0.02
 PATH_STEP = 0.02
+LOBE_ANGLES = np.deg2rad([-110.0, -55.0, 0.0, 55.0, 110.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +55,15 @@ class Walk:
         Direction the chest points in, in rad, unwrapped.
     phases : (N,) float array
         Phase of the gait in rad: one stride is 2 pi, and the phase stands while the person stands.
+
+    Examples
+    --------
+    Between two times the person is between two places; afterwards it stays at the last.
+
+    >>> positions, straight = np.array([[0.0, 0.0], [2.0, 0.0]]), np.zeros(2)
+    >>> walk = Walk(np.array([0.0, 1.0]), positions, straight, straight)
+    >>> walk.at(0.5)[0].tolist(), walk.at(9.0)[0].tolist()
+    ([1.0, 0.0], [2.0, 0.0])
     """
 
     t: np.ndarray
@@ -55,14 +77,27 @@ class Walk:
         return np.linalg.norm(np.gradient(self.positions, self.t, axis=0), axis=1)
 
     def at(self, t):
-        """Position (2,), heading and gait phase at time `t` in s, held at the ends."""
+        """Where the person is at one time, held at the ends.
+
+        Parameters
+        ----------
+        t : float
+            In s.
+
+        Returns
+        -------
+        position : (2,) float array
+            In m.
+        heading, phase : float
+            In rad.
+        """
         columns = np.column_stack([self.positions, self.headings, self.phases])
         x, y, heading, phase = (np.interp(t, self.t, column) for column in columns.T)
         return np.array([x, y]), heading, phase
 
 
 def figure_eight(scene, seed, laps=5, first_turn="left", **gait):
-    """A walk in figure-eights round the first two objects of a scene.
+    """A walk in figure-eights round the first two objects of a scene (Fig. 6a).
 
     Parameters
     ----------
@@ -72,7 +107,8 @@ def figure_eight(scene, seed, laps=5, first_turn="left", **gait):
     laps : int
         Figure-eights, each begun and ended midway between the objects.
     first_turn : str
-        "left": counter-clockwise round the second object, then clockwise round the first; "right": the other way.
+        "left": counter-clockwise round the second object, then clockwise round the first; "right":
+        the other way.
     **gait
         Keywords of `walk`.
 
@@ -83,7 +119,18 @@ def figure_eight(scene, seed, laps=5, first_turn="left", **gait):
     Raises
     ------
     ValueError
-        If the scene has fewer than two objects, `first_turn` is neither, or there is no room to walk.
+        If the scene has fewer than two objects, `first_turn` is neither, or there is no room.
+
+    Examples
+    --------
+    A lap goes once round either object, in opposite senses.
+
+    >>> from dollop.lab.scenes import figure_eight_scene
+    >>> scene = figure_eight_scene()
+    >>> away = figure_eight(scene, seed=0, laps=1).positions - scene.positions[:, None]
+    >>> bearings = np.unwrap(np.arctan2(away[..., 1], away[..., 0]))
+    >>> ((bearings[:, -1] - bearings[:, 0]) / (2 * np.pi)).round().tolist()
+    [-1.0, 1.0]
     """
     if len(scene.kinds) < 2:
         raise ValueError(f"a figure-eight needs two objects, the scene has {len(scene.kinds)}")
@@ -96,11 +143,8 @@ def figure_eight(scene, seed, laps=5, first_turn="left", **gait):
     return walk(np.vstack([*laps_points, end]), scene, rng, **gait)
 
 
-LOBE_ANGLES = np.deg2rad([-110.0, -55.0, 0.0, 55.0, 110.0])
-
-
 def figure_eight_points(first, second, turn, rng, radius=1.22):
-    """Via-points of one lap: the middle, round `second`, the middle, round `first`; `turn` +1 is left first."""
+    """Via-points of a lap: middle, round `second`, middle, round `first`; `turn` +1: left first."""
     middle, axis = (first + second) / 2, second - first
     bearing = np.arctan2(axis[1], axis[0])
 
@@ -117,14 +161,15 @@ def figure_eight_points(first, second, turn, rng, radius=1.22):
 
 
 def slalom(scene, seed, sides=None, approach=1.0, swing=0.75, **gait):
-    """A walk along the scene's objects in their order, past each on its given side.
+    """A walk along the scene's objects in their order, past each on its given side (Fig. 11a).
 
     Parameters
     ----------
     scene : Scene
     seed : int or numpy.random.Generator
     sides : sequence of N values +1 or -1, optional
-        +1 leaves the walker left of the object as seen along the row, -1 right of it; alternating when not given.
+        +1 leaves the walker left of the object as seen along the row, -1 right of it; alternating
+        when not given.
     approach : float
         Length in m walked before the first and after the last object.
     swing : float
@@ -132,10 +177,24 @@ def slalom(scene, seed, sides=None, approach=1.0, swing=0.75, **gait):
     **gait
         Keywords of `walk`.
 
+    Returns
+    -------
+    Walk
+
     Raises
     ------
     ValueError
-        If the scene has fewer than two objects, a side is neither +1 nor -1, or there is no room to walk.
+        If the scene has fewer than two objects, a side is neither +1 nor -1, or there is no room.
+
+    Examples
+    --------
+    Left of both cones is above them, where the row goes to the right.
+
+    >>> from dollop.lab.scenes import slalom_scene
+    >>> scene = slalom_scene(2)
+    >>> x, y = slalom(scene, seed=0, sides=[1, 1]).positions.T
+    >>> bool((np.interp(scene.positions[:, 0], x, y) > scene.positions[:, 1]).all())
+    True
     """
     objects = scene.positions
     if len(objects) < 2:
@@ -144,10 +203,9 @@ def slalom(scene, seed, sides=None, approach=1.0, swing=0.75, **gait):
     if sides.shape != (len(objects),) or not np.all(np.abs(sides) == 1):
         raise ValueError(f"sides must be {len(objects)} values of +1 or -1, got {sides.tolist()}")
     rng = np.random.default_rng(seed)
-    along = np.gradient(objects, axis=0)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    left = np.column_stack([-along[:, 1], along[:, 0]])
-    passing = objects + (sides * (swing + rng.normal(0.0, 0.04, len(objects))))[:, None] * left
+    along = tangents(objects)
+    aside = sides * (swing + rng.normal(0.0, 0.04, len(objects)))
+    passing = objects + aside[:, None] * left_of(along)
     start, end = objects[0] - approach * along[0], objects[-1] + approach * along[-1]
     points = np.vstack([start, passing, end])
     return walk(points + rng.normal(0.0, 0.04, points.shape), scene, rng, **gait)
@@ -179,10 +237,21 @@ def walk(points, scene, seed, speed=1.05, drift=0.04, sway=0.02, stand=1.5):
     ------
     ValueError
         If the walk comes nearer to the background than `BACKGROUND_CLEARANCE` beside the shoulder.
+
+    Examples
+    --------
+    Sent straight through a cone, a person keeps clear of its foot.
+
+    >>> from dollop.lab.scenes import slalom_scene
+    >>> cone = slalom_scene(1)
+    >>> way = walk([(3.0, 3.55), (6.0, 3.55)], cone, seed=0).positions
+    >>> gap = np.linalg.norm(way - cone.positions, axis=1).min() - cone.foot_radii[0]
+    >>> bool(gap - SHOULDERS / 2 >= CLEARANCE)
+    True
     """
     rng = np.random.default_rng(seed)
     path = smooth_path(np.asarray(points, dtype=float))
-    path = path + normals(path) * wander(len(path), 1.5 / PATH_STEP, drift, rng)[:, None]
+    path = path + left_of(tangents(path)) * wander(len(path), 1.5 / PATH_STEP, drift, rng)[:, None]
     path = evenly(keep_clear(path, scene))
     distance = travelled(speed_profile(path, speed, rng), stand)
     positions, headings = along_path(path, distance)
@@ -195,9 +264,30 @@ def walk(points, scene, seed, speed=1.05, drift=0.04, sway=0.02, stand=1.5):
 
 
 def smooth_path(points):
-    """A spline through (K, 2) via-points, sampled every `PATH_STEP` m."""
+    """A smooth path through via-points: a centripetal cubic spline, sampled every 2 cm.
+
+    Parameters
+    ----------
+    points : (K, 2) array
+        In m, two or more.
+
+    Returns
+    -------
+    (N, 2) float array
+        In m.
+
+    Examples
+    --------
+    It is evenly sampled.
+
+    >>> path = smooth_path(np.array([(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)]))
+    >>> steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    >>> bool(np.allclose(steps, 0.02, rtol=0.02))
+    True
+    """
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    knots = np.concatenate([[0.0], np.cumsum(np.sqrt(chords))])  # centripetal: no loops where points crowd
+    steps = np.sqrt(chords)  # centripetal: no loops where points crowd
+    knots = np.concatenate([[0.0], np.cumsum(steps)])
     fine = np.linspace(0.0, knots[-1], 50 * len(points))
     return evenly(CubicSpline(knots, points)(fine))
 
@@ -207,15 +297,26 @@ def evenly(path, step=PATH_STEP):
     return resample(path, max(2, round(arc_length(path)[-1] / step) + 1))
 
 
-def normals(path):
-    """Unit vectors to the left of every point of a path."""
-    tangents = np.gradient(path, axis=0)
-    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-    return np.column_stack([-tangents[:, 1], tangents[:, 0]])
+def tangents(path):
+    """Unit vectors along a path at each of its points (N, 2)."""
+    along = np.gradient(path, axis=0)
+    return along / np.linalg.norm(along, axis=1, keepdims=True)
+
+
+def left_of(along):
+    """Unit vectors to the left of unit vectors (N, 2)."""
+    return np.column_stack([-along[:, 1], along[:, 0]])
+
+
+def smooth_headings(path, width):
+    """Directions (N,) in rad, unwrapped, of a path smoothed over `width` samples."""
+    smooth = gaussian_filter1d(path, width, axis=0, mode="nearest")
+    along = np.gradient(smooth, axis=0)
+    return np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
 
 
 def wander(n, correlation, spread, rng):
-    """Gaussian noise with standard deviation `spread` and a correlation length of `correlation` samples."""
+    """Gaussian noise of standard deviation `spread`, correlated over `correlation` samples."""
     noise = gaussian_filter1d(rng.normal(size=n), correlation / 2, mode="reflect")
     return spread * noise * np.sqrt(correlation * np.sqrt(np.pi))
 
@@ -234,38 +335,39 @@ def keep_clear(points, scene, softness=0.03):
 def speed_profile(path, speed, rng, bend=0.8, acceleration=0.7):
     """Speed in m/s at every point of an evenly sampled path.
 
-    Curves are walked slower by the two-thirds power law of human movement, v ~ curvature^(-1/3) (Lacquaniti et al.,
-    1983), here speed * (1 + (curvature / bend)^2)^(-1/6) so that straight lines have a finite speed; fluctuations of
-    4 % that last metres are laid over it, and it starts and ends at rest within the `acceleration` in m/s^2.
+    Curves are walked slower by the two-thirds power law of human movement, v ~ curvature^(-1/3)
+    (Lacquaniti et al., 1983), here speed * (1 + (curvature / bend)^2)^(-1/6) so that straight lines
+    have a finite speed; fluctuations of 4 % that last metres are laid over it, and it starts and
+    ends at rest within the `acceleration` in m/s^2.
     """
     step = arc_length(path)[1]
-    smooth = gaussian_filter1d(path, 0.2 / step, axis=0, mode="nearest")
-    headings = np.unwrap(np.arctan2(*np.gradient(smooth, axis=0).T[::-1]))
-    curvature = np.gradient(headings) / step
+    curvature = np.gradient(smooth_headings(path, 0.2 / step)) / step
     wish = speed * (1.0 + (curvature / bend) ** 2) ** (-1 / 6)
     wish *= 1.0 + wander(len(path), 3.0 / step, 0.04, rng)
     ends = np.minimum(np.arange(len(path)), np.arange(len(path))[::-1]) * step
-    return np.minimum(gaussian_filter1d(wish, 0.3 / step), np.sqrt(2 * acceleration * (ends + step / 10)))
+    possible = np.sqrt(2 * acceleration * (ends + step / 10))
+    return np.minimum(gaussian_filter1d(wish, 0.3 / step), possible)
 
 
 def travelled(speeds, stand):
-    """Distance in m at every time step when `speeds` hold along an evenly sampled path, standing before and after."""
+    """Distance in m at every time step by the speeds of an even path, standing before and after."""
     speeds_between = (speeds[1:] + speeds[:-1]) / 2
     times = np.concatenate([[0.0], np.cumsum(PATH_STEP / speeds_between)]) + stand
     t = np.arange(0.0, times[-1] + stand, TIME_STEP)
-    return gaussian_filter1d(np.interp(t, times, np.arange(len(speeds)) * PATH_STEP), 0.15 / TIME_STEP, mode="nearest")
+    distance = np.interp(t, times, np.arange(len(speeds)) * PATH_STEP)
+    return gaussian_filter1d(distance, 0.15 / TIME_STEP, mode="nearest")
 
 
 def along_path(path, distance):
-    """Positions (N, 2) and smoothed headings (N,) at the given distances along an evenly sampled path."""
+    """Positions (N, 2) and smoothed headings (N,) at distances along an evenly sampled path."""
     arc = np.arange(len(path)) * PATH_STEP
-    smooth = gaussian_filter1d(path, 0.15 / PATH_STEP, axis=0, mode="nearest")
-    headings = np.unwrap(np.arctan2(*np.gradient(smooth, axis=0).T[::-1]))
-    return np.column_stack([np.interp(distance, arc, column) for column in path.T]), np.interp(distance, arc, headings)
+    columns = np.column_stack([path, smooth_headings(path, 0.15 / PATH_STEP)]).T
+    x, y, headings = (np.interp(distance, arc, column) for column in columns)
+    return np.column_stack([x, y]), headings
 
 
 def gait_phases(distance):
-    """Gait phase in rad: strides come faster and grow longer with speed, as the square root of it each."""
+    """Gait phase in rad: strides come faster and grow longer with speed, each by its square root."""
     speeds = np.clip(np.gradient(distance, TIME_STEP), 0.0, None)
     return np.cumsum(2 * np.pi * STRIDE_RATE * np.sqrt(speeds) * TIME_STEP)
 
@@ -275,8 +377,6 @@ def check_room(positions):
     room = background_distance(positions) - SHOULDERS / 2
     nearest = np.argmin(room)
     if room[nearest] < BACKGROUND_CLEARANCE:
+        rule = f"{BACKGROUND_CLEARANCE} m between shoulder and background"
         place = np.round(positions[nearest], 2).tolist()
-        raise ValueError(
-            f"a walk must keep {BACKGROUND_CLEARANCE} m between shoulder and background, "
-            f"got {room[nearest]:.2f} m at {place}"
-        )
+        raise ValueError(f"a walk must keep {rule}, got {room[nearest]:.2f} m at {place}")

@@ -14,12 +14,14 @@ from dollop.formats.logs import read_log, write_log
 from dollop.lab.scenes import Scene
 from dollop.laser import LaserLog
 
+__all__ = ["Recording", "TRUTH_COLUMNS"]
+
 TRUTH_COLUMNS = ["t", "x", "y", "heading"]
 
 
 @dataclass(frozen=True)
 class Recording:
-    """A demonstration as recorded in the laboratory.
+    """A demonstration as recorded in the laboratory (Sec. II).
 
     Attributes
     ----------
@@ -36,12 +38,13 @@ class Recording:
     scene: Scene
 
     def save(self, path):
-        """Write `path` (a CARMEN log: .log or .log.gz), and beside it the truth and the scene.
+        """Write the log, and beside it the truth and the scene.
 
         Parameters
         ----------
         path : str or Path
-            For `walk.log.gz` the others are `walk_truth.csv` and `walk_scene.json`.
+            Of a CARMEN log, .log or .log.gz. For `walk.log.gz` the others are `walk_truth.csv` and
+            `walk_scene.json`.
         """
         write_log(path, self.log)
         truth, scene = companions(path)
@@ -53,6 +56,15 @@ class Recording:
     @classmethod
     def load(cls, path):
         """Read what `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+            Of the log.
+
+        Returns
+        -------
+        Recording
 
         Raises
         ------
@@ -71,11 +83,9 @@ def load_truth(path, n_scans):
     except ValueError as error:
         raise FormatError(f"not a table of numbers: {error}", path) from error
     if list(truth.columns) != TRUTH_COLUMNS or len(truth) not in (0, n_scans):
-        raise FormatError(
-            f"columns must be {TRUTH_COLUMNS} and rows {n_scans}, one for each scan, or none if nobody walks, "
-            f"got {list(truth.columns)} and {len(truth)}",
-            path,
-        )
+        rule = f"columns must be {TRUTH_COLUMNS} and rows {n_scans}, one for each scan"
+        got = f"got {list(truth.columns)} and {len(truth)}"
+        raise FormatError(f"{rule}, or none if nobody walks, {got}", path)
     return truth
 
 

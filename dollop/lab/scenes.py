@@ -1,27 +1,40 @@
-"""What stands where in the laboratory: fixed background furniture and the movable foreground objects of a scene.
+"""What stands where in the laboratory: background furniture, and the movable objects of a scene.
 
-The room is 9 m by 7 m, its lower left corner the origin of the world. Nothing here needs PyBullet.
+A reconstruction: the paper shows its laboratory in one photograph (Fig. 5). The room is 9 m by 7 m,
+its lower left corner the origin of the world. Nothing here needs PyBullet.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+__all__ = [
+    "BACKGROUND",
+    "BEAM_HEIGHT",
+    "FURNITURE",
+    "KINDS",
+    "Part",
+    "ROOM",
+    "Scene",
+    "WHITE",
+    "background_distance",
+    "empty_scene",
+    "figure_eight_scene",
+    "moved",
+    "rearranged",
+    "slalom_scene",
+]
+
 ROOM = (9.0, 7.0)
 WALL_HEIGHT = 2.4
 WALL_THICKNESS = 0.10
 SPACING = 0.45
-"""Least free distance in m round a foreground object: nearer ones lose points to the background radius of Sec. II."""
+"""Least free distance in m round an object: the radius of Sec. II swallows what is nearer."""
 BEAM_HEIGHT = 0.36
-"""Height of the laser's plane over the floor, in m: a SICK LMS 200 on the deck of a Pioneer 2 DX."""
+"""Height of the laser's plane over the floor in m: a SICK LMS 200 on the deck of a Pioneer 2 DX."""
 
-OAK, STEEL, WHITE, DARK, GREY = (
-    (0.72, 0.53, 0.33),
-    (0.55, 0.58, 0.62),
-    (0.90, 0.89, 0.85),
-    (0.13, 0.14, 0.16),
-    (0.42, 0.44, 0.47),
-)
+OAK, STEEL, WHITE = (0.72, 0.53, 0.33), (0.55, 0.58, 0.62), (0.90, 0.89, 0.85)
+DARK, GREY, BLUE = (0.13, 0.14, 0.16), (0.42, 0.44, 0.47), (0.30, 0.48, 0.66)
 
 
 @dataclass(frozen=True)
@@ -61,7 +74,7 @@ class Kind:
     beam_radius : float
         Radius in m where the laser meets it.
     foot_radius : float
-        Radius in m of the circle round its widest part, which is what a walker or a robot must avoid.
+        Radius in m of the circle round its widest part, which a walker or a robot must avoid.
     height : float
         Height in m.
     """
@@ -76,7 +89,7 @@ KINDS = {"trash can": Kind(0.18, 0.18, 0.66), "cone": Kind(0.13, 0.28, 1.0)}
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The movable half of the laboratory: foreground objects and where the robot stands.
+    """The movable half of the laboratory: foreground objects, and where the robot stands (Fig. 5).
 
     Attributes
     ----------
@@ -90,8 +103,18 @@ class Scene:
     Raises
     ------
     ValueError
-        If an object is of no known kind, or stands nearer than 0.45 m to the background or to another object:
-        nearer than that the background radius of Sec. II would swallow part of it. Or if it stands outside the room.
+        If an object is of no known kind, stands outside the room, or nearer than 0.45 m to the
+        background or to another object: nearer than that the background radius of Sec. II would
+        swallow part of it.
+
+    Examples
+    --------
+    The laser meets a cone above its foot, where it is narrower.
+
+    >>> scene = Scene(("cone",), [(4.5, 3.5)])
+    >>> xmin, ymin, xmax, ymax = scene.boxes[0]
+    >>> bool(xmax - xmin < 2 * scene.foot_radii[0])
+    True
     """
 
     kinds: tuple
@@ -121,22 +144,30 @@ class Scene:
         return np.hstack([self.positions - radii, self.positions + radii])
 
     def to_dict(self):
-        """The scene as plain lists, for JSON."""
-        return {"kinds": list(self.kinds), "positions": self.positions.tolist(), "robot": list(self.robot)}
+        """The scene as plain lists, for JSON.
+
+        Returns
+        -------
+        dict
+            The arguments that make the scene again.
+        """
+        positions = self.positions.tolist()
+        return {"kinds": list(self.kinds), "positions": positions, "robot": list(self.robot)}
 
 
 def check_objects(kinds, positions):
-    """Raise ValueError unless the objects are of known kinds and stand apart and clear of the background."""
+    """Raise ValueError unless the objects are of known kinds and stand clear of everything."""
     if len(kinds) != len(positions):
-        raise ValueError(f"a scene needs one position per kind, got {len(kinds)} kinds and {len(positions)} positions")
+        got = f"{len(kinds)} kinds and {len(positions)} positions"
+        raise ValueError(f"a scene needs one position per kind, got {got}")
     for kind in kinds:
         if kind not in KINDS:
             raise ValueError(f"kind must be one of {sorted(KINDS)}, got {kind!r}")
     radii = np.array([KINDS[kind].beam_radius for kind in kinds])
     for index, gap in enumerate(free_gaps(positions, radii)):
         if not gap >= SPACING:
-            place = positions[index].tolist()
-            raise ValueError(f"a {kinds[index]} must stand {SPACING} m clear of everything, got {gap:.2f} m at {place}")
+            rule, place = f"{SPACING} m clear of everything", positions[index].tolist()
+            raise ValueError(f"a {kinds[index]} must stand {rule}, got {gap:.2f} m at {place}")
 
 
 def free_gaps(positions, radii):
@@ -169,13 +200,30 @@ def box_distance(points, boxes):
 
 
 def background_distance(points):
-    """Distance in m of each of (N, 2) points to the nearest wall or piece of furniture, zero outside the room."""
-    inside = np.all((np.asarray(points) >= 0.0) & (np.asarray(points) <= ROOM), axis=1)
+    """How far points are from the nearest wall or piece of furniture.
+
+    Parameters
+    ----------
+    points : (N, 2) array_like
+        In m.
+
+    Returns
+    -------
+    (N,) float array
+        In m, zero outside the room.
+
+    Examples
+    --------
+    >>> background_distance([(4.5, 3.5), (4.5, 0.4), (4.5, -0.4)]).round(6).tolist()
+    [2.333838, 0.4, 0.0]
+    """
+    points = np.asarray(points)
+    inside = np.all((points >= 0.0) & (points <= ROOM), axis=1)
     return np.where(inside, box_distance(points, BACKGROUND_BOXES), 0.0)
 
 
 def desk(x, y, width, facing, computer=True):
-    """A desk with its back edge's middle at (x, y), people sitting on its `facing` (+1: +y, -1: -y) side."""
+    """A desk, its back edge's middle at (x, y), people sitting on the `facing` side (+1: +y)."""
     depth, top = 0.75, 0.72
     middle = y + facing * depth / 2
     left, right = x - width / 2, x + width / 2
@@ -196,7 +244,7 @@ def computer_parts(x, y, facing, top):
         Part("box", (x + 0.45, y + facing * 0.20, top + 0.02), (0.26, 0.18, 0.03), DARK),
         Part("box", (x + 0.45, y + facing * 0.18, top + 0.10), (0.05, 0.04, 0.16), DARK),
         Part("box", (x + 0.45, y + facing * 0.20, top + 0.31), (0.48, 0.05, 0.32), DARK),
-        Part("box", (x + 0.45, y + facing * 0.228, top + 0.315), (0.44, 0.01, 0.27), (0.30, 0.48, 0.66)),
+        Part("box", (x + 0.45, y + facing * 0.228, top + 0.315), (0.44, 0.01, 0.27), BLUE),
         Part("box", (x + 0.45, y + facing * 0.52, top + 0.012), (0.44, 0.15, 0.02), WHITE),
     ]
 
@@ -248,28 +296,82 @@ BACKGROUND_BOXES = np.array([part.bounds for part in BACKGROUND])
 
 
 def empty_scene():
-    """The laboratory without foreground objects, as the background map is made in."""
+    """The laboratory without foreground objects, as the background map is made in (Sec. II).
+
+    Returns
+    -------
+    Scene
+    """
     return Scene((), np.empty((0, 2)))
 
 
 def figure_eight_scene():
-    """Two trash cans four metres apart, the robot watching from the lower wall (Fig. 5)."""
+    """Two trash cans four metres apart, the robot watching from the lower wall (Fig. 5).
+
+    Returns
+    -------
+    Scene
+    """
     return Scene(("trash can", "trash can"), [(2.5, 3.6), (6.5, 3.6)])
 
 
 def slalom_scene(n_cones=4, spacing=1.5):
-    """A row of slalom cones across the middle of the laboratory, `spacing` m apart."""
+    """A row of slalom cones across the middle of the laboratory (Fig. 11; its size is ours).
+
+    Parameters
+    ----------
+    n_cones : int
+    spacing : float
+        Between the middles of neighbouring cones in m.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    ValueError
+        If a cone would not stand clear of the others and of the background.
+
+    Examples
+    --------
+    >>> np.diff(slalom_scene(3, spacing=1.5).positions, axis=0).tolist()
+    [[1.5, 0.0], [1.5, 0.0]]
+    """
     offsets = (np.arange(n_cones) - (n_cones - 1) / 2) * spacing
-    return Scene(("cone",) * n_cones, np.column_stack([ROOM[0] / 2 + offsets, np.full(n_cones, 3.6)]))
+    positions = np.column_stack([ROOM[0] / 2 + offsets, np.full(n_cones, 3.6)])
+    return Scene(("cone",) * n_cones, positions)
 
 
 def moved(scene, shifts):
-    """The scene with its foreground objects shifted by (N, 2) metres."""
+    """The scene with its foreground objects elsewhere, each by a shift of its own (Fig. 10).
+
+    Parameters
+    ----------
+    scene : Scene
+    shifts : (N, 2) array_like
+        In m.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    ValueError
+        If an object does not stand clear there, as for `Scene`.
+
+    Examples
+    --------
+    >>> scene = figure_eight_scene()
+    >>> (moved(scene, [(0.5, 0.0), (0.0, -0.5)]).boxes - scene.boxes).round(6).tolist()
+    [[0.5, 0.0, 0.5, 0.0], [0.0, -0.5, 0.0, -0.5]]
+    """
     return Scene(scene.kinds, scene.positions + np.asarray(shifts), scene.robot)
 
 
 def rearranged(scene, rng, reach=0.6, spacing=1.0, attempts=10_000):
-    """The scene with every foreground object moved somewhere else.
+    """The scene with every foreground object moved somewhere else, at random (Sec. IV).
 
     Parameters
     ----------
@@ -282,19 +384,31 @@ def rearranged(scene, rng, reach=0.6, spacing=1.0, attempts=10_000):
     attempts : int
         Draws after which to give up.
 
+    Returns
+    -------
+    Scene
+
     Raises
     ------
     ValueError
         If no such layout is found.
+
+    Examples
+    --------
+    >>> scene = rearranged(figure_eight_scene(), np.random.default_rng(0), spacing=1.2)
+    >>> bool((background_distance(scene.positions) - scene.foot_radii >= 1.2).all())
+    True
     """
     for _ in range(attempts):
         positions = scene.positions + rng.normal(0.0, reach, scene.positions.shape)
         if free_room(scene, positions) >= spacing:
             return Scene(scene.kinds, positions, scene.robot)
-    raise ValueError(f"spacing must leave room for {len(scene.kinds)} objects, found none for {spacing} m")
+    n_objects = len(scene.kinds)
+    raise ValueError(f"spacing must leave room for {n_objects} objects, found none for {spacing} m")
 
 
 def free_room(scene, positions):
     """Least free distance in m round the scene's objects if they stood at (N, 2) `positions`."""
-    robot = np.linalg.norm(positions - scene.robot[:2], axis=1) - scene.foot_radii
-    return min(free_gaps(positions, scene.foot_radii).min(initial=np.inf), robot.min(initial=np.inf))
+    gaps = free_gaps(positions, scene.foot_radii)
+    to_robot = np.linalg.norm(positions - scene.robot[:2], axis=1) - scene.foot_radii
+    return min(gaps.min(initial=np.inf), to_robot.min(initial=np.inf))
