@@ -1,19 +1,41 @@
-"""How Sphinx lays out the book; book/build.py calls it."""
+"""How Sphinx lays out the book; book/build.py calls it.
+
+The API pages come from the docstrings by extensions that are part of Sphinx: autodoc reads them,
+napoleon understands their numpydoc sections. (autosummary could write the pages, but it takes the
+module dollop.laps for the function.)
+"""
+
+import re
+from importlib.util import find_spec
 
 from docutils.nodes import SkipNode
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.util.nodes import make_refnode
 
 project = "Dollop"
 author = "the Dollop developers"
 copyright = "2026, the Dollop developers"
 html_title = "Dollop"
 
-extensions = ["myst_nb", "sphinx_copybutton"]
-myst_enable_extensions = ["dollarmath"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+]
+myst_enable_extensions = ["dollarmath", "html_image"]
 nb_execution_mode = "off"  # book/build.py has executed them
 nb_output_stderr = "remove"
 nb_ipywidgets_js = {}  # stills stand in for widgets, so nothing has to come from a network
 exclude_patterns = [".doctrees"]
+
+default_role = "py:obj"  # single backticks in docstrings become links where they can
+add_module_names = False
+toc_object_entries_show_parents = "hide"
+autodoc_member_order = "bysource"
+autodoc_mock_imports = [name for name in ("pybullet",) if find_spec(name) is None]
+napoleon_google_docstring = False
+napoleon_use_rtype = False
 
 html_theme = "furo"
 html_static_path = ["static"]
@@ -26,6 +48,9 @@ html_theme_options = {
     "dark_css_variables": {"color-brand-primary": "#56B4E9", "color-brand-content": "#56B4E9"},
 }
 html_math_renderer = "mathml"
+
+SHORT = {"function", "class", "exception"}
+MEMBERS = {"method", "classmethod", "staticmethod", "property", "attribute"}
 
 
 def inline_formula(translator, node):
@@ -40,6 +65,48 @@ def block_formula(translator, node):
     raise SkipNode
 
 
+def plain_text_first(app, what, name, thing, options, lines):
+    """Docstrings are written to be read as they are: |x| is a length there, `.law` an attribute."""
+    for n, line in enumerate(lines):
+        prose = line if line[:1] in ("", " ", ">", "=") else line.replace("|", r"\|")
+        lines[n] = re.sub(r"(?<!`)`(\.[^`]+)`(?!`)", r"``\1``", prose)
+    if what == "property":
+        lines.insert(0, "")  # or napoleon takes what stands before a colon for a type
+
+
+def formulas_as_they_stand(app, what, name, thing, options, lines):
+    """Keep the lines and signs of a formula: an indented block after a paragraph is literal."""
+    for n in range(len(lines) - 2, 0, -1):
+        before = next(filter(None, reversed(lines[:n])), " ")
+        if lines[n] == "" and lines[n + 1].startswith("    ") and before[0] not in " .":
+            lines[n:n] = ["", "::"]
+
+
+def defined_elsewhere(app, what, name, thing, skip, options):
+    """Leave out what a package only hands on: it has its entry on the page of its own module."""
+    if what != "module" or not hasattr(thing, "__qualname__"):
+        return None
+    return True if thing.__module__ != app.env.current_document.autodoc_module else None
+
+
+def by_short_name(app, env, node, contnode):
+    """Link a short name (`observe`, `LDS.fit`) to its entry, if only one object is called so."""
+    if node.get("refdomain") != "py":
+        return None
+    short = "." + node["reftarget"].removeprefix("dollop.")
+    kinds = SHORT if short.count(".") == 1 else SHORT | MEMBERS
+    objects = env.domains.python_domain.objects.items()
+    found = [(name, to) for name, to in objects if name.endswith(short) and to.objtype in kinds]
+    if len(found) != 1:
+        return None
+    name, to = found[0]
+    return make_refnode(app.builder, node["refdoc"], to.docname, to.node_id, contnode, name)
+
+
 def setup(app):
     """Browsers draw MathML on their own: no script, no network."""
     app.add_html_math_renderer("mathml", (inline_formula, None), (block_formula, None))
+    for prepare in (plain_text_first, formulas_as_they_stand):
+        app.connect("autodoc-process-docstring", prepare, priority=400)  # before napoleon
+    app.connect("autodoc-skip-member", defined_elsewhere)
+    app.connect("missing-reference", by_short_name)
