@@ -1,25 +1,49 @@
 """Dollop: learning by observation with a mobile robot (Dixon & Khosla, ICRA 2004).
 
-A person shows a task by walking it; the robot watches with its laser, extracts subgoals, ties them to the objects in
-the room, learns one model from several demonstrations and performs the task.
+A person shows a task by walking it; the robot watches with its laser, extracts subgoals, ties them
+to the objects in the room, learns one model from several demonstrations and performs the task.
 
-The paper's notation, and where it lives:
+The paper's notation, and where it lives (names in `dollop`):
 
-=====================  ======================================================================  ====================
-symbol                 meaning                                                                 name
-=====================  ======================================================================  ====================
-x_n                    position on a trajectory relative to the segment's subgoal (Sec. III)   `LDS.step`
-A                      matrix of one LDS, x_{n+1} = A x_n (Sec. III)                           `LDS.A`
-g                      subgoal: where a segment ends (Sec. III)                                `LDS.goal`
-Omega^i                environment configuration of demonstration i: 4N corners (Sec. IV)      `Environment.corners`
-omega_m^i              corner m of Omega^i (Sec. IV-A)                                         row m of it
-k_{m,n}^i              spring constant between two corners (Sec. IV-A)                         `spring_constants`
-f_m^i                  force on a corner (Sec. IV-A)                                           `spring_forces`
-c(omega_m, omega_n)    cost of matching two corners, an integer (Sec. IV-A)                    `integer_costs`
-alpha                  scale of the cost before rounding up (Sec. IV-A)                        `alpha`
-g(.)                   the matching of two environment configurations (Sec. IV-A)              `Matching.indices`
-m                      how many of the closest corners a subgoal is tied to (Sec. IV-B)        `m` of `associate`
-=====================  ======================================================================  ====================
+====  ==========  ============================================  ===============================
+Sec.  symbol      meaning                                       name
+====  ==========  ============================================  ===============================
+II                background occupancy grid map                 `OccupancyGrid`
+II                laser scan; no return is inf                  `LaserLog.ranges`
+II                foreground cell: no background near it        `foreground.foreground_mask`
+II    g           value of a cell of the foreground grid        `foreground.ForegroundGrid`
+II                blob: adjacent occupied foreground cells      `foreground.Blobs`
+II    x, P        state of a track and its covariance           `tracking.predict`
+II    F, Q        motion model of the Kalman filter, its noise  `Motion.transition`
+II    z           measured centroid of a foreground object      `Track.measurements`
+II                greedy search of tracks for objects           `tracking.match_greedily`
+II                occluded; disappeared after 5 seconds         `Tracker.disappear_after`
+II                user: the fastest foreground object           `tracking.identify_user`
+III   p_n         position on a trajectory                      `trajectory`
+III               laps: walks along one trajectory              `laps`
+III   x_n         position relative to a segment's subgoal      `LDS.step`
+III   A           matrix of one LDS, x_{n+1} = A x_n            `LDS.A`
+III   g           subgoal: where a segment ends                 `LDS.goal`
+III   G0, G1      statistics of a segment; they add up          `lds.Statistics`
+III               response of the control law from a start      `SequencedLDS.response`
+III   u           direction of the supervisory control law      `robot.control.Guidance`
+III   v, omega    speed and turning rate that it asks for       `robot.control.CONTROL_LAWS`
+III               performing a task; kidnapping the robot       `perform`
+IV    Omega^i     environment configuration i: 4N corners       `Environment.corners`
+IV-A  omega_m^i   corner m of Omega^i                           row m of it
+IV-A  k_{m,n}^i   spring constant between two corners           `environment.spring_constants`
+IV-A  f_m^i       total force of the springs on a corner        `environment.spring_forces`
+IV-A  c           cost of matching two corners, an integer      `environment.integer_costs`
+IV-A  alpha       scale of the cost before rounding up          `alpha` of it
+IV-A  g(.)        matching of two environments                  `Matching.indices`
+IV-B  m           closest corners that a subgoal is tied to     `m` of `associate`
+IV-B  w_l         weight of a corner: closer, heavier           `Association.weights`
+V                 CDHMM: states that emit subgoals              `SubgoalHMM`
+V     n, s, q     statistics of a state; they add up            `cdhmm.evidence`
+V     a_{uv}      probability of a step between states          `SubgoalHMM.transitions`
+V                 most-likely path: the task's subgoals         `SubgoalHMM.most_likely_path`
+V                 task, learned and adapted                     `learn`
+====  ==========  ============================================  ===============================
 
 SI units throughout; a pose is (x, y, theta); time comes first in every array.
 """
@@ -40,6 +64,8 @@ from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
 from dollop.tracking import Motion, Track, Tracker
 
+__version__ = "0.1.0"
+
 __all__ = [
     "LDS",
     "Association",
@@ -59,6 +85,7 @@ __all__ = [
     "Track",
     "Tracker",
     "Unicycle",
+    "__version__",
     "associate",
     "associate_with_frames",
     "laps",
