@@ -22,7 +22,7 @@ import numpy as np
 
 from dollop.checks import checked_array, checked_positions
 from dollop.environment import Environment
-from dollop.matching import match_confidently
+from dollop.matching import Matching, match_confidently
 from dollop.pose import rotation, wrapped
 
 _EPSILON = 0.05**2  # m²: corners are not known better than to a cell of the foreground grid
@@ -101,9 +101,9 @@ class Association:
 
     def _indices(self, environment, matching):
         n, m = len(self.environment.corners), len(environment.corners)
-        if matching is None:
-            if np.array_equal(self.environment.boxes, environment.boxes):
-                return np.arange(n)
+        if matching is None and np.array_equal(self.environment.boxes, environment.boxes):
+            matching = Matching.identity(len(environment))
+        elif matching is None:
             matching = match_confidently(self.environment, environment, ("the associated environment", "the new one"))
         if len(matching.indices) != n or matching.indices.max(initial=-1) >= m:
             raise ValueError(

@@ -63,6 +63,16 @@ class Environment:
         """(N, 2) array, m: the middle of each box."""
         return (self.boxes[:, :2] + self.boxes[:, 2:]) / 2
 
+    @cached_property
+    def corner_offsets(self):
+        """(4N, 2) array, m: each corner as seen from the middle of its box."""
+        return self.corners - np.repeat(self.centres, 4, axis=0)
+
+    def __repr__(self):
+        places = ", ".join(f"({x:.2f}, {y:.2f})" for x, y in self.centres[:6])
+        more = f", ... {len(self) - 6} more" if len(self) > 6 else ""
+        return f"Environment of {len(self)} objects round {places}{more}" if len(self) else "Environment of 0 objects"
+
 
 def _checked_boxes(boxes):
     if np.size(boxes) == 0:
@@ -76,6 +86,35 @@ def _checked_boxes(boxes):
         )
     boxes.flags.writeable = False
     return boxes
+
+
+def corner_indices(partners, turn=0.0):
+    """Which corner each corner goes to, where it is known which object each object goes to.
+
+    Boxes stay parallel to the axes: in a layout that was turned by a right angle the lower left corner becomes the
+    lower right.
+
+    Parameters
+    ----------
+    partners : (N,) int array
+        For each object the one that it goes to, -1 where it is left out.
+    turn : float
+        Of the layout, in rad; to the nearest right angle.
+
+    Returns
+    -------
+    (4N,) int array
+        -1 for the corners of what is left out.
+
+    Examples
+    --------
+    >>> corner_indices(np.array([1, -1])).tolist()
+    [4, 5, 6, 7, -1, -1, -1, -1]
+    >>> corner_indices(np.array([0]), turn=np.pi / 2).tolist()
+    [1, 2, 3, 0]
+    """
+    corners = (np.arange(4) + round(turn / (np.pi / 2))) % 4
+    return np.where(partners[:, None] >= 0, 4 * partners[:, None] + corners, -1).ravel()
 
 
 def spring_constants(corners):

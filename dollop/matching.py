@@ -27,7 +27,7 @@ import numpy as np
 import scipy
 
 from dollop.checks import check_choice, check_positive
-from dollop.environment import integer_costs
+from dollop.environment import corner_indices, integer_costs
 
 _KAPPA = 1.0  # of a layout that was turned, small turns are a little likelier
 _TURNED = 4.0  # L_turn, nats
@@ -66,6 +66,25 @@ class Matching:
     margin: float
     confident: bool
     turn: float = 0.0
+
+    @classmethod
+    def identity(cls, n):
+        """The matching of n objects with themselves, beyond doubt.
+
+        Parameters
+        ----------
+        n : int
+
+        Returns
+        -------
+        Matching
+        """
+        return cls(corner_indices(np.arange(n)), 0.0, np.inf, True)
+
+    @property
+    def partners(self):
+        """(N,) int array: object a of i goes to object partners[a] of j; -1 where it is left out."""
+        return self.indices[::4] // 4
 
 
 def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4):
@@ -127,7 +146,7 @@ def match_confidently(environment_i, environment_j, names=("the task's environme
         two are.
     """
     if len(environment_i) == len(environment_j) == 1:
-        return Matching(np.arange(4), 0.0, np.inf, True)
+        return Matching.identity(1)
     try:
         matching = match(environment_i, environment_j)
     except ValueError as error:
@@ -159,13 +178,7 @@ def _match_robustly(environment_i, environment_j, left_out, moved):
     few = _count_partial(len(x), len(y)) <= _ENUMERATED
     partners, cost, margin, turn = (_enumerate if few else _search)(x, y, price)
     confident = bool(margin >= np.log(_ODDS))
-    return Matching(_corner_indices(partners, turn), float(cost), float(margin), confident, float(turn))
-
-
-def _corner_indices(partners, turn):
-    # Boxes stay parallel to the axes: in a layout turned by a right angle the lower left becomes the lower right.
-    corners = (np.arange(4) + round(turn / (pi / 2))) % 4
-    return np.where(partners[:, None] >= 0, 4 * partners[:, None] + corners, -1).ravel()
+    return Matching(corner_indices(partners, turn), float(cost), float(margin), confident, float(turn))
 
 
 def _costs_of(x, y, partners, price):

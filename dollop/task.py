@@ -298,9 +298,8 @@ def check_laws(demonstrations):
 
 def matching_to(environment, demonstration, number):
     """The matching from demonstration `number` to the environment to learn in; identity where it is the same one."""
-    n = len(environment)
     if np.array_equal(demonstration.environment.boxes, environment.boxes):
-        return Matching(np.arange(4 * n), 0.0, np.inf, True)
+        return Matching.identity(len(environment))
     return match_confidently(demonstration.environment, environment, (f"demonstration {number}", "the one to learn in"))
 
 
@@ -360,7 +359,7 @@ def tie_to_objects(environment, pairs, members):
 def centres_in(environment, shown, matching):
     """Centres (N, 2) of the objects of another environment in this one's order, `nan` where there is none."""
     centres = np.full((len(environment), 2), np.nan)
-    partners = matching.indices[::4] // 4
+    partners = matching.partners
     centres[partners[partners >= 0]] = shown.centres[partners >= 0]
     return centres
 
@@ -372,5 +371,4 @@ def tie(environment, seen):
     found = associate_with_frames([[place] for place, _ in seen], frames)
     weights, local = np.zeros(len(environment)), np.zeros((len(environment), 2))
     weights[common], local[common] = found.weights[:, 0], found.local[:, 0]
-    to_corner = environment.corners - np.repeat(environment.centres, 4, axis=0)
-    return np.repeat(weights / 4, 4), np.repeat(local, 4, axis=0) - to_corner
+    return np.repeat(weights / 4, 4), np.repeat(local, 4, axis=0) - environment.corner_offsets

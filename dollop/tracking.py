@@ -336,25 +336,56 @@ def smooth(t, measurements, motion=None):
     positions, velocities : (N, 2) float arrays
         m and m/s.
     """
-    motion = motion or Motion()
+    filtered, predicted, transitions = kalman_filter(t, measurements, motion or Motion())
+    return _smooth_backwards(filtered, predicted, transitions)
+
+
+def kalman_filter(t, measurements, motion, carry_on=None):
+    """The Kalman filter of one object: from the measurements so far, never from later ones.
+
+    Parameters
+    ----------
+    t : (N,) float array
+        Seconds, increasing.
+    measurements : (N, 2) float array
+        Centroids in m, `nan` where the object was occluded; the first must be finite.
+    motion : Motion
+        The motion model.
+    carry_on : callable, optional
+        carry_on(i, means, covariances, F, Q) predicts to scan i where the object was occluded; by default as the motion
+        model does.
+
+    Returns
+    -------
+    filtered, predicted : lists of N and N - 1 (means (1, n, 2), covariances (1, n, n))
+        After each scan, and before all but the first.
+    transitions : list of N - 1 (n, n) float arrays
+        F between each scan and the next.
+    """
     means, covariances = motion.birth(measurements[:1])
-    transitions = {dt: motion.transition(dt) for dt in np.unique(np.diff(t))}
-    predicted, filtered, F = [], [(means, covariances)], [transitions[dt][0] for dt in np.diff(t)]
-    for dt, z in zip(np.diff(t), measurements[1:], strict=True):
-        means, covariances = predict(means, covariances, *transitions[dt])
+    models = {dt: motion.transition(dt) for dt in np.unique(np.diff(t))}
+    filtered, predicted, transitions = [(means, covariances)], [], []
+    for i, (dt, z) in enumerate(zip(np.diff(t), measurements[1:], strict=True), start=1):
+        F, Q = models[dt]
+        seen = np.isfinite(z[0])
+        if seen or carry_on is None:
+            means, covariances = predict(means, covariances, F, Q)
+        else:
+            means, covariances = carry_on(i, means, covariances, F, Q)
         predicted.append((means, covariances))
-        if np.isfinite(z[0]):
+        transitions.append(F)
+        if seen:
             means, covariances = update(means, covariances, z[None], motion.measurement_sd)
         filtered.append((means, covariances))
-    return smooth_backwards(filtered, predicted, F)
+    return filtered, predicted, transitions
 
 
-def smooth_backwards(filtered, predicted, F):
+def _smooth_backwards(filtered, predicted, transitions):
     """The backward pass: x_n <- x_n + P_n F^T P_{n+1|n}^-1 (x_{n+1} - x_{n+1|n}), from the last state to the first."""
     x, P = (np.concatenate(column) for column in zip(*filtered, strict=True))
     if predicted:
         ahead, ahead_P = (np.concatenate(column) for column in zip(*predicted, strict=True))
-        gains = P[:-1] @ np.transpose(F, (0, 2, 1)) @ np.linalg.inv(ahead_P)
+        gains = P[:-1] @ np.transpose(transitions, (0, 2, 1)) @ np.linalg.inv(ahead_P)
         for n in reversed(range(len(gains))):
             x[n] += gains[n] @ (x[n + 1] - ahead[n])
     return x[:, 0], x[:, 1]
