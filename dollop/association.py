@@ -49,6 +49,10 @@ class Association:
     weights: np.ndarray
     differences: np.ndarray
 
+    def __repr__(self):
+        subgoals, corners = self.corners.shape
+        return f"Association of {subgoals} subgoals with {corners} corners each; {self.environment}"
+
     def relocate(self, environment, matching=None, turned=False):
         """Where the subgoals are when the objects stand elsewhere (Sec. IV-B).
 
@@ -206,6 +210,9 @@ class Frames:
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "directions", wrapped(directions))
 
+    def __repr__(self):
+        return f"Frames of {len(self)} objects"
+
     def __len__(self):
         return len(self.positions)
 
@@ -224,6 +231,10 @@ class FrameAssociation:
 
     local: np.ndarray
     weights: np.ndarray
+
+    def __repr__(self):
+        frames, subgoals = self.weights.shape
+        return f"FrameAssociation of {subgoals} subgoals with {frames} frames"
 
     def relocate(self, frames):
         """Where the subgoals (K, 2) are, in m, when the frames stand elsewhere: the same frames in the same order."""

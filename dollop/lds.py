@@ -32,6 +32,9 @@ class Statistics:
     G0: np.ndarray
     G1: np.ndarray
 
+    def __repr__(self):
+        return f"Statistics(G0={np.shape(self.G0)}, G1={np.shape(self.G1)})"
+
     def __add__(self, other):
         return Statistics(self.G0 + other.G0, self.G1 + other.G1)
 
@@ -99,6 +102,10 @@ class LDS:
         radius = np.abs(np.linalg.eigvals(self.A)).max()
         if not radius < 1:
             raise ValueError(f"A must have a spectral radius below one, got {radius}")
+
+    def __repr__(self):
+        (x, y), radius = self.goal, np.abs(np.linalg.eigvals(self.A)).max()
+        return f"LDS to ({x:.2f}, {y:.2f}), spectral radius {radius:.3f}"
 
     @cached_property
     def A(self):

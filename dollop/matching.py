@@ -67,6 +67,11 @@ class Matching:
     confident: bool
     turn: float = 0.0
 
+    def __repr__(self):
+        pairs = ", ".join(f"{a} to {b}" for a, b in enumerate(self.partners) if b >= 0)
+        sure = "confident" if self.confident else "not confident"
+        return f"Matching of objects {pairs or 'none'}: {sure}, margin {self.margin:.3g}"
+
     @classmethod
     def identity(cls, n):
         """The matching of n objects with themselves, beyond doubt.

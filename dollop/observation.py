@@ -42,6 +42,9 @@ class Observation:
     environment: Environment
     losses: int
 
+    def __repr__(self):
+        return f"Observation of {len(self.tracks)} tracks; user: {self.user}; {self.environment}"
+
 
 def observe(
     log,

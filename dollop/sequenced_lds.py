@@ -30,6 +30,11 @@ class SequencedLDS:
     start: np.ndarray
     speeds: np.ndarray
 
+    def __repr__(self):
+        (x, y), (goal_x, goal_y) = self.start, self.subgoals[-1]
+        way = f"from ({x:.2f}, {y:.2f}) to ({goal_x:.2f}, {goal_y:.2f})"
+        return f"SequencedLDS of {len(self.segments)} segments {way}"
+
     @property
     def subgoals(self):
         """(K, 2) float array: where the segments end, m."""

@@ -49,6 +49,10 @@ class Demonstration:
     def __post_init__(self):
         check_trajectories(self.trajectory)
 
+    def __repr__(self):
+        walks = len(check_trajectories(self.trajectory))
+        return f"Demonstration of {walks} walks; {self.environment}"
+
     @classmethod
     def of(cls, observation, tolerance=0.02):
         """The demonstration in an Observation: the user's laps, or the whole walk if it does not repeat itself.
@@ -92,6 +96,10 @@ class Task:
     association: Association
     model: SubgoalHMM = None
     demonstrations: tuple = ()
+
+    def __repr__(self):
+        learned = f"learned from {len(self.demonstrations)} demonstrations"
+        return f"Task of {len(self.law.segments)} subgoals, {learned}; {self.environment}"
 
     @classmethod
     def of(cls, demonstration):

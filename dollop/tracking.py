@@ -41,6 +41,10 @@ class Track:
     occluded: np.ndarray
     measurements: np.ndarray
 
+    def __repr__(self):
+        seconds, hidden = np.ptp(self.t), self.occluded.mean()
+        return f"Track of {len(self)} scans in {seconds:.1f} s, {hidden:.0%} occluded"
+
     def __len__(self):
         return len(self.t)
 

@@ -94,6 +94,11 @@ class SubgoalHMM:
     spread: float
     evidence: float
 
+    def __repr__(self):
+        path = " ".join(map(str, self.most_likely_path()))
+        text = f"SubgoalHMM of {len(self.means)} states from {len(self.sequences)} demonstrations"
+        return f"{text}, most-likely path {path}"
+
     @classmethod
     def fit(cls, sequences, spread=0.15):
         """Estimate structure and parameters from the subgoals of each demonstration.

@@ -75,6 +75,9 @@ class Odometry:
     poses: np.ndarray
     velocities: np.ndarray
 
+    def __repr__(self):
+        return f"Odometry of {len(self)} messages in {np.ptp(self.t):.1f} s"
+
     def __len__(self):
         return len(self.t)
 

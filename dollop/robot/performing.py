@@ -66,6 +66,11 @@ class Run:
     collisions: int
     kidnapped: np.ndarray
 
+    def __repr__(self):
+        end = "finished" if self.finished else self.reason
+        touched = f"{self.collisions} collisions, least clearance {self.clearance.min():.2f} m"
+        return f"Run of {self.t[-1]:.1f} s: {end}; {touched}"
+
 
 class Unicycle:
     """A kinematic robot with the Pioneer's limits that knows its pose; it passes through what it
@@ -90,6 +95,9 @@ class Unicycle:
     """
 
     localised = True
+
+    def __repr__(self):
+        return "Unicycle at ({:.2f}, {:.2f}, {:.2f})".format(*self.pose)
 
     def __init__(self, pose, limits=PIONEER_LIMITS, period=0.1):
         self.limits, self.period = Limits(*limits), period
