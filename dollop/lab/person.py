@@ -1,4 +1,4 @@
-"""A person walking a task: via-points that differ in every lap, a smooth path, human speed and gait.
+"""A person walking a task: via-points that differ in every lap, smooth path, human speed and gait.
 
 The walk is made from geometry and noise, never from a dynamical system: what is later fitted to it
 is not what made it. It is a reconstruction: the paper says no more than that a user walked several
@@ -367,7 +367,7 @@ def along_path(path, distance):
 
 
 def gait_phases(distance):
-    """Gait phase in rad: strides come faster and grow longer with speed, each by its square root."""
+    """Gait phase in rad: strides come faster and grow longer, each by the square root of speed."""
     speeds = np.clip(np.gradient(distance, TIME_STEP), 0.0, None)
     return np.cumsum(2 * np.pi * STRIDE_RATE * np.sqrt(speeds) * TIME_STEP)
 

@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+import pybullet
 
 from dollop.lab.sick import SickLMS200
-from dollop.lab.world import PHYSICS_RATE, pybullet
+from dollop.lab.world import PHYSICS_RATE
 from dollop.pose import motion_between, moved_pose
 from dollop.robot.control import PIONEER_LIMITS, Limits
 from dollop.robot.localization import MonteCarloLocalizer
@@ -186,14 +187,9 @@ class Pioneer:
     def _turn_wheels(self, speed, turn):
         """Let the motors turn the wheels for a speed in m/s and a turning rate in rad/s."""
         rates = (np.array([-0.5, 0.5]) * self.wheel_base * turn + speed) / self.wheel_radius
-        self.world.call(
-            "setJointMotorControlArray",
-            self.body,
-            WHEELS,
-            pybullet.VELOCITY_CONTROL,
-            targetVelocities=rates,
-            forces=[self.motor_torque] * 2,
-        )
+        wanted = {"targetVelocities": rates, "forces": [self.motor_torque] * 2}
+        mode = pybullet.VELOCITY_CONTROL
+        self.world.call("setJointMotorControlArray", self.body, WHEELS, mode, **wanted)
 
     def _update_odometry(self):
         """Add what the wheels turned since the last time to the believed pose."""

@@ -8,13 +8,7 @@ from dollop.lab.scenes import BEAM_HEIGHT
 
 __all__ = ["SickLMS200", "cast"]
 
-SCAN_RATES = {
-    (180, 1.0): 10.0,
-    (180, 0.5): 5.0,
-    (100, 1.0): 17.0,
-    (100, 0.5): 9.0,
-    (100, 0.25): 4.5,
-}
+SCAN_RATES = {(180, 1): 10.0, (180, 0.5): 5.0, (100, 1): 17.0, (100, 0.5): 9.0, (100, 0.25): 4.5}
 """Scans per second at 38400 baud for each field of view and resolution in degrees on offer."""
 
 RESOLUTIONS = {"mm": (1000, 8.191), "cm": (100, 81.91)}

@@ -1,4 +1,4 @@
-"""Recording in the simulated laboratory: a person watched by a standing robot, and a tour for the background map."""
+"""Recording in the laboratory: a person watched by a standing robot, and a tour for the map."""
 
 import numpy as np
 import pandas as pd
@@ -13,26 +13,21 @@ from dollop.laser import LaserLog
 from dollop.pose import wrapped
 from dollop.robot.control import PIONEER_LIMITS
 
-TOUR = (
-    (4.5, 2.6),
-    (7.6, 2.3),
-    (8.1, 3.6),
-    (7.7, 4.9),
-    (5.0, 5.1),
-    (2.4, 4.9),
-    (1.0, 3.8),
-    (1.2, 2.2),
-    (3.2, 1.6),
-    (5.6, 1.4),
-    (4.5, 3.6),
+__all__ = ["record", "record_background", "record_figure_eights", "watch"]
+
+TOUR = np.transpose(
+    [
+        (4.5, 7.6, 8.1, 7.7, 5.0, 2.4, 1.0, 1.2, 3.2, 5.6, 4.5),
+        (2.6, 2.3, 3.6, 4.9, 5.1, 4.9, 3.8, 2.2, 1.6, 1.4, 3.6),
+    ]
 )
-"""Way-points in m of the drive that shows the laser every side of the background."""
+"""Way-points (K, 2) in m of the drive that shows the laser every side of the background."""
 TOUR_LIMITS = PIONEER_LIMITS._replace(turn=1.75)
 """On that drive the robot may turn as fast as it can: 100 deg/s (Player, p2os)."""
 
 
 def record(scene, walk, seed, sick=None, legs=False):
-    """Watch a walk with the laser of the standing robot.
+    """Watch a walk with the laser of the standing robot (Sec. II).
 
     Parameters
     ----------
@@ -50,21 +45,19 @@ def record(scene, walk, seed, sick=None, legs=False):
     Recording
     """
     sick, rng = sick or SickLMS200(), np.random.default_rng(seed)
-    t = np.arange(0.0, walk.t[-1], 1 / sick.rate)
-    pose = laser_pose(scene.robot)
+    t, pose = np.arange(0.0, walk.t[-1], 1 / sick.rate), laser_pose(scene.robot)
     states = [walk.at(time) for time in t]
+    ranges, rows = [], []
     with World(scene, legs) as world:
-        ranges = []
-        for state in states:
-            world.place_person(*state)
+        for time, (position, heading, phase) in zip(t, states, strict=True):
+            world.place_person(position, heading, phase)
             ranges.append(sick.scan(world, pose, rng))
-    log = LaserLog(t, np.array(ranges), sick.angles, np.tile(pose, (len(t), 1)), sick.max_range)
-    rows = [(time, *position, wrapped(heading)) for time, (position, heading, _) in zip(t, states, strict=True)]
-    return Recording(log, pd.DataFrame(rows, columns=TRUTH_COLUMNS), scene)
+            rows.append((time, *position, wrapped(heading)))
+    return as_recording(t, ranges, sick, rows, scene)
 
 
 def watch(scene, seed, duration=6.0, sick=None):
-    """What the standing robot's laser sees of a scene in which nobody walks.
+    """What the standing robot's laser sees of a scene in which nobody walks (Sec. IV).
 
     Parameters
     ----------
@@ -83,24 +76,33 @@ def watch(scene, seed, duration=6.0, sick=None):
     sick, rng = sick or SickLMS200(), np.random.default_rng(seed)
     t, pose = np.arange(0.0, duration, 1 / sick.rate), laser_pose(scene.robot)
     with World(scene) as world:
-        ranges = np.array([sick.scan(world, pose, rng) for _ in t])
-    log = LaserLog(t, ranges, sick.angles, np.tile(pose, (len(t), 1)), sick.max_range)
-    return Recording(log, pd.DataFrame(columns=TRUTH_COLUMNS), scene)
+        ranges = [sick.scan(world, pose, rng) for _ in t]
+    return as_recording(t, ranges, sick, [], scene)
+
+
+def as_recording(t, ranges, sick, rows, scene):
+    """The scans (T, B) of the standing robot and the rows of the truth, as a Recording."""
+    poses = np.tile(laser_pose(scene.robot), (len(t), 1))
+    log = LaserLog(t, np.array(ranges), sick.angles, poses, sick.max_range)
+    return Recording(log, pd.DataFrame(rows, columns=TRUTH_COLUMNS), scene)
 
 
 def record_figure_eights(seed, laps=5, scene=None, sick=None, legs=False, **gait):
-    """Five figure-eights round two trash cans, seen by the laser (Fig. 6a): a `record` of `person.figure_eight`.
+    """Figure-eights round two trash cans, seen by the laser (Fig. 6a).
+
+    A `record` of a `figure_eight`.
 
     Parameters
     ----------
-    seed : int
+    seed : int or numpy.random.Generator
     laps : int
     scene : Scene, optional
         `figure_eight_scene()` when not given.
-    sick, legs
+    sick : SickLMS200, optional
+    legs : bool
         As for `record`.
     **gait
-        Keywords of `person.figure_eight` and `person.walk`.
+        Keywords of `figure_eight` and `walk`.
 
     Returns
     -------
@@ -108,11 +110,14 @@ def record_figure_eights(seed, laps=5, scene=None, sick=None, legs=False, **gait
     """
     scene = scene or figure_eight_scene()
     walking, sensing = np.random.default_rng(seed).spawn(2)
-    return record(scene, person.figure_eight(scene, walking, laps, **gait), sensing, sick, legs)
+    walk = person.figure_eight(scene, walking, laps, **gait)
+    return record(scene, walk, sensing, sick, legs)
 
 
 def record_background(seed, sick=None):
-    """Drive the robot through the empty laboratory and log the laser with true poses, for a background map.
+    """Drive through the empty laboratory and log the laser with true poses, for a map (Sec. II).
+
+    The paper's robot mapped its laboratory by CARMEN; here the poses are known.
 
     Parameters
     ----------
@@ -129,7 +134,7 @@ def record_background(seed, sick=None):
     poses, ranges = [], []
     with World(scene) as world:
         robot = Pioneer(world, scene.robot, limits=TOUR_LIMITS, sick=sick)
-        for goal in np.asarray(TOUR):
+        for goal in TOUR:
             while np.linalg.norm(goal - robot.pose[:2]) > 0.3:
                 poses.append(laser_pose(robot.pose))
                 ranges.append(sick.scan(world, poses[-1], rng))
@@ -139,7 +144,7 @@ def record_background(seed, sick=None):
 
 
 def pursue(pose, goal, speed=0.5, gain=1.5):
-    """Speed in m/s and turning rate in rad/s towards a goal (2,), slower the farther it lies off the heading."""
+    """Speed in m/s and turning rate in rad/s towards a goal (2,), slower where it is aside."""
     x, y, theta = pose
     error = wrapped(np.arctan2(goal[1] - y, goal[0] - x) - theta)
     return speed * max(np.cos(error), 0.0) ** 2, gain * error
