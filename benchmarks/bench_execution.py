@@ -45,8 +45,7 @@ def timed(name, times_real, make_robot, task, control, background, repeats=5):
 
 def timed_in_lab(scene, task, background):
     """A row for the Pioneer in PyBullet with its laser and its localisation."""
-    from dollop.lab.pioneer import Pioneer
-    from dollop.lab.world import World
+    from dollop.lab import Pioneer, World
 
     with World(scene) as world:
         robot = Pioneer(world, START, background, task.environment, seed=0)

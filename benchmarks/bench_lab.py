@@ -6,6 +6,8 @@ python -m benchmarks lab
 import numpy as np
 
 from benchmarks.timing import row, seconds
+from dollop.lab import SickLMS200, figure_eight_scene
+from dollop.lab.scenes import BEAM_HEIGHT
 
 SCANS = 200
 
@@ -14,8 +16,6 @@ def plain_scan(world, pose, sick):
     """True distances by one ray test per beam, each answer taken apart in Python."""
     x, y, theta = pose
     reach, distances = sick.max_range, []
-    from dollop.lab.scenes import BEAM_HEIGHT
-
     for angle in sick.angles:
         end = [x + reach * np.cos(theta + angle), y + reach * np.sin(theta + angle), BEAM_HEIGHT]
         body, _, fraction, *_ = world.call("rayTest", [x, y, BEAM_HEIGHT], end)[0]
@@ -24,14 +24,13 @@ def plain_scan(world, pose, sick):
 
 
 def run(repeats=7):
-    """Time `SickLMS200.scan` in the figure-eight scene with a person in it; the bound is 500 scans/s.
+    """Time `SickLMS200.scan` in the figure-eight scene with a person; the bound is 500 scans/s.
 
     Returns
     -------
     list of dict
     """
-    from dollop.lab import SickLMS200, World, figure_eight_scene
-    from dollop.lab.pioneer import laser_pose
+    from dollop.lab import World, laser_pose
 
     scene, sick, rng = figure_eight_scene(), SickLMS200(), np.random.default_rng(0)
     pose = laser_pose(scene.robot)
@@ -39,4 +38,5 @@ def run(repeats=7):
         world.place_person(np.array([4.5, 3.6]), 0.0, 0.0)
         fast, _ = seconds(lambda: [sick.scan(world, pose, rng) for _ in range(SCANS)], repeats)
         plain, _ = seconds(lambda: [plain_scan(world, pose, sick) for _ in range(SCANS)], 3)
-    return [row(f"SICK, {SCANS} scans of 181 beams ({SCANS / fast:.0f} scans/s)", fast, plain, SCANS / 500)]
+    name = f"SICK, {SCANS} scans of 181 beams ({SCANS / fast:.0f} scans/s)"
+    return [row(name, fast, plain, SCANS / 500)]
