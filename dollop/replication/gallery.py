@@ -7,7 +7,7 @@ that they cannot drift apart.
 
 __all__ = ["NAMES", "page"]
 
-NAMES = {  # name in metrics.json, without the end that says of what: words, and the unit
+NAMES = {  # name in metrics.json, without the beginning that says of what: words, and the unit
     "beams": ("beams", ""),
     "returns": ("beams that came back", ""),
     "track_error_mean_m": ("track error, mean", "m"),
@@ -20,6 +20,7 @@ NAMES = {  # name in metrics.json, without the end that says of what: words, and
     "mean_error_m": ("mean error of the law", "m"),
     "mean_error_laps_m": ("mean error to the single laps", "m"),
     "tolerance_m": ("tolerance asked for", "m"),
+    "largest_corner_deg": ("largest corner of the law, at a subgoal", "°"),
     "runs": ("runs", ""),
     "finished": ("runs that finished", ""),
     "collisions": ("contacts with an obstacle, in all runs", ""),
@@ -102,20 +103,29 @@ def table(numbers, columns):
     |---|---|
     | mean error of the law | 13 mm |
     | segments, an LDS each | 6 |
-    >>> print(table({"runs": 5, "finished": 4, "finished_aware": 5}, {"": "plain law", "_aware": "going round"}))
+    >>> print(table({"runs": 5, "plain_finished": 4, "own_finished": 5}, {"plain": "plain law", "own": "going round"}))
     | | plain law | going round |
     |---|---|---|
-    | runs | 5 | |
+    | runs | 5 | 5 |
     | runs that finished | 4 | 5 |
     """
-    rows = {}
-    for key, value in numbers.items():
-        name, end = parted(key, columns)
-        rows.setdefault(name, {})[end] = quantity(value, NAMES[name][1])
-    ends = columns or {"": ""}
-    lines = [["", *ends.values()], ["---"] * (len(ends) + 1)]
-    lines += [[NAMES[name][0], *(cells.get(end, "") for end in ends)] for name, cells in rows.items()]
+    names = dict.fromkeys(name_of(key, columns) for key in numbers)
+    lines = [["", *(columns or {"": ""}).values()], ["---"] * (len(columns or " ") + 1)]
+    for name in names:
+        words, unit = NAMES[name]
+        values = [of_what(numbers, column, name) for column in columns or [""]]
+        lines.append([words, *(quantity(value, unit) for value in values)])
     return "\n".join(line(cells) for cells in lines)
+
+
+def of_what(numbers, column, name):
+    """The number of this name that is the column's own, else what is told of all, else no number.
+
+    >>> numbers = {"cost": 1.8, "literal_cost": 28268, "own_finished": 10}
+    >>> of_what(numbers, "literal", "cost"), of_what(numbers, "robust", "cost"), of_what(numbers, "plain", "finished")
+    (28268, 1.8, '')
+    """
+    return numbers.get(f"{column}_{name}", numbers.get(name, ""))
 
 
 def line(cells):
@@ -125,22 +135,22 @@ def line(cells):
     return "|" + "|".join(f" {cell} " if cell else " " for cell in cells) + "|"
 
 
-def parted(key, ends):
-    """A key of metrics.json as its name in NAMES and which of `ends` it ends in.
+def name_of(key, columns):
+    """The name in NAMES of a key of metrics.json, whichever of the columns it begins with.
 
-    >>> parted("finished_aware", {"": "plain law", "_aware": "going round"})
-    ('finished', '_aware')
+    >>> name_of("plain_finished", {"plain": "plain law"}), name_of("runs", {"plain": "plain law"})
+    ('finished', 'runs')
 
     Raises
     ------
     KeyError
         A number that nobody has named in words.
     """
-    for end in sorted(ends or {""}, key=len, reverse=True):
-        name = key.removesuffix(end)
-        if key.endswith(end) and name in NAMES:
-            return name, end
-    raise KeyError(f"no words for the number {key!r}: add them to NAMES")
+    begun = [key.removeprefix(f"{column}_") for column in columns if key.startswith(f"{column}_")]
+    name = begun[0] if begun else key
+    if name not in NAMES:
+        raise KeyError(f"no words for the number {key!r}: add them to NAMES")
+    return name
 
 
 def quantity(value, unit=""):
@@ -153,6 +163,8 @@ def quantity(value, unit=""):
         return "none"
     if isinstance(value, list):
         return " ".join(map(str, value))
+    if value == "":
+        return ""
     if unit == "m":
         return f"{1000 * value:.0f} mm" if abs(value) < 1 else f"{value:.2f} m"
     if unit:

@@ -13,6 +13,7 @@ from dollop.observation import observe
 from dollop.robot.avoidance import ObstacleMap
 from dollop.robot.performing import free_poses, perform
 from dollop.task import Demonstration, Task, learn
+from dollop.trajectory import arc_length, at_arc_length
 
 SEED = 2004
 """Every experiment draws from this seed, the year of the paper."""
@@ -230,11 +231,11 @@ def starts_near_the_beginning(task, count, rng):
 
 
 @cache
-def eight_runs(control, count=10):
-    """Runs of the figure-eight in the laboratory, nothing but the law in force (Fig. 7a)."""
+def eight_runs(control="pursuit", avoid=True, count=10):
+    """Runs of the figure-eight in the laboratory (Fig. 7a)."""
     task, scene = figure_eight_task(), figure_eights().scene
     starts = starts_near_the_beginning(task, count, np.random.default_rng(SEED))
-    return [run_in_lab(task, scene, start, k, control=control, avoid=False) for k, start in enumerate(starts)]
+    return [run_in_lab(task, scene, start, k, control=control, avoid=avoid) for k, start in enumerate(starts)]
 
 
 @cache
@@ -250,7 +251,7 @@ def kidnappings(count=5):
 
 
 @cache
-def kidnapped_runs(control, avoid, count=5):
+def kidnapped_runs(control="pursuit", avoid=True, count=5):
     """Runs of the figure-eight, each kidnapped once (Fig. 7b)."""
     task, scene = figure_eight_task(), figure_eights().scene
     return [
@@ -267,16 +268,38 @@ def moved_runs(k, control="pursuit", avoid=True, count=10):
     return [run_in_lab(task, scene, start, seed, control=control, avoid=avoid) for seed, start in enumerate(starts)]
 
 
-def counts(runs):
-    """How many runs there were, how many finished, how often the robot hit something, and in how
-    many runs.
+def largest_corner(law, over=0.1):
+    """The largest angle by which a law's response turns where one segment hands over to the next.
+
+    It is the angle between the ways to the place of the handing over and on from it, each so many
+    metres of the response: in its last centimetres a response curls into its subgoal, which no robot
+    can follow and no eye sees.
+
+    Parameters
+    ----------
+    law : SequencedLDS
+    over : float
+        In m.
+
+    Returns
+    -------
+    float
+        In rad; 0 for a single segment.
     """
-    return {
-        "runs": len(runs),
-        "finished": sum(run.finished for run in runs),
-        "collisions": sum(run.collisions for run in runs),
-        "runs_with_collision": sum(run.collisions > 0 for run in runs),
-    }
+    response = law.response()
+    walked, places = arc_length(response), hand_overs(law, response)
+    before, here, after = (at_arc_length(response, walked[places] + shift) for shift in (-over, 0, over))
+    arriving, going_on = (here - before) @ (1, 1j), (after - here) @ (1, 1j)
+    return float(np.abs(np.angle(going_on * arriving.conj())).max(initial=0))
+
+
+def hand_overs(law, response, reach=0.01):
+    """Indices into a response (M, 2) at which it first is within reach (m) of each subgoal but the last."""
+    found = [0]
+    for subgoal in law.subgoals[:-1]:
+        near = np.linalg.norm(response[found[-1] :] - subgoal, axis=1) <= reach
+        found.append(found[-1] + int(near.argmax()))
+    return found[1:]
 
 
 def passing_sides(path, centres):

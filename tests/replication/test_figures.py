@@ -2,12 +2,14 @@
 
 import json
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from places import ROOT
 
 from dollop.replication import baseline, figures, recordings
+from dollop.replication.figures.runs import CONTROLS, numbers
 from dollop.replication.layouts import matching_shares
 from dollop.robot.performing import distances_to_law
 
@@ -57,37 +59,58 @@ def test_observing_and_segmenting_are_in_their_bands():
 
 
 def test_performing_is_in_its_bands():
-    """Fig. 7: ten runs finish, no collision, 80 mm (plain) and 40 mm from the law; going round obstacles hits none."""
+    """Fig. 7: all runs finish near the law and touch nothing; kidnapped, only plain hits something."""
     runs, kidnapped = COMMITTED["7a"], COMMITTED["7b"]
-    assert runs["finished"] == runs["finished_pursuit"] == 10
-    assert runs["collisions"] == runs["collisions_pursuit"] == 0
-    assert runs["mean_distance_m"] <= 0.080 and runs["mean_distance_m_pursuit"] <= 0.040
-    assert runs["localisation_error_m"] <= 0.05 and runs["localisation_error_deg"] <= 3
-    assert kidnapped["finished_aware"] == 5 and kidnapped["collisions_aware"] == 0
-    assert kidnapped["runs_with_collision"] > kidnapped["runs_with_collision_aware"] == 0
+    for kind, farthest in (("plain", 0.080), ("own", 0.040)):
+        assert runs[f"{kind}_finished"] == runs["runs"] == 10 and runs[f"{kind}_collisions"] == 0
+        assert runs[f"{kind}_mean_distance_m"] <= farthest
+        assert runs[f"{kind}_localisation_error_m"] <= 0.05 and runs[f"{kind}_localisation_error_deg"] <= 3
+    assert kidnapped["own_finished"] == kidnapped["runs"] == 5
+    assert kidnapped["plain_runs_with_collision"] > kidnapped["own_runs_with_collision"] == 0
 
 
 def test_moved_objects_are_in_their_bands():
     """Figs 10 and x1: three layouts matched right, all runs finish; robust matching right where the literal is not."""
     assert COMMITTED["10a"]["matching_right"] == COMMITTED["10b"]["matching_right"] == 3
-    assert COMMITTED["10b"]["finished"] == COMMITTED["10b"]["runs"] == COMMITTED["10b"]["runs_plain"] == 30
-    assert COMMITTED["10b"]["collisions"] == 0
+    assert COMMITTED["10b"]["own_finished"] == COMMITTED["10b"]["runs"] == 30
+    assert COMMITTED["10b"]["own_collisions"] == 0
     shares = COMMITTED["x1"]
-    assert shares["2_objects_robust"] >= 0.99 and shares["3_objects_robust"] >= 0.97
-    assert shares["4_objects_robust"] >= 0.90 and shares["2_objects_literal"] < 0.5
-    assert shares["cans_seen_robust"] >= 0.95 > shares["cans_seen_literal"]
+    assert shares["robust_2_objects"] >= 0.99 and shares["robust_3_objects"] >= 0.97
+    assert shares["robust_4_objects"] >= 0.90 and shares["literal_2_objects"] < 0.5
+    assert shares["robust_cans_seen"] >= 0.95 > shares["literal_cans_seen"]
 
 
 def test_learning_is_in_its_bands():
     """Figs 12 and x2: runs finish on the demonstrated side, where the plain law hits; merging is right from two on."""
     assert COMMITTED["12a"]["path_length"] <= COMMITTED["12a"]["states_after"] < COMMITTED["12a"]["states_before"]
     runs = COMMITTED["12b"]
-    assert runs["finished"] == runs["passed_on_the_demonstrated_side"] == 10 and runs["collisions"] == 0
-    assert runs["runs_plain"] == 10 and runs["runs_with_collision_plain"] >= 5
+    assert runs["own_finished"] == runs["own_passed_on_the_demonstrated_side"] == runs["runs"] == 10
+    assert runs["own_collisions"] == 0 and runs["plain_runs_with_collision"] >= 5
     shares = COMMITTED["x2"]
-    assert shares["right_2_merging"] >= 0.95 and shares["right_5_merging"] >= 0.99
-    assert 0.9 <= shares["error_by_expected_merging"] <= 1.1
-    assert shares["seeds_hmm"] == shares["seeds_left_to_right"] >= 12
+    assert shares["merging_right_2"] >= 0.95 and shares["merging_right_5"] >= 0.99
+    assert 0.9 <= shares["merging_error_by_expected"] <= 1.1
+    assert shares["hmm_seeds"] == shares["left_to_right_seeds"] >= 12
+
+
+def test_corners_are_told_for_the_law_that_the_runs_follow():
+    """Adapting turns a law's corners; the law of Figure 10a is that of Figure 10b."""
+    corners = {panel: COMMITTED[panel]["largest_corner_deg"] for panel in ("6b", "10a", "10b", "12b")}
+    assert corners["10a"] == corners["10b"] > corners["6b"] > 0
+    assert 0 < corners["12b"] < 180
+
+
+def test_numbers_are_named_after_the_kind_of_control():
+    """Counts of each kind with the kind before the name, the number of runs once; contacts are not runs with one."""
+
+    def run(finished, collisions):
+        return SimpleNamespace(finished=finished, collisions=collisions, clearance=np.array([0.3, 0.1 - collisions]))
+
+    found = numbers({"plain": [run(True, 2), run(False, 1)], "own": [run(True, 0)] * 2}, lambda runs: {"n": len(runs)})
+    plain = {"finished": 1, "collisions": 3, "runs_with_collision": 2, "min_clearance_m": -1.9, "n": 2}
+    own = {"finished": 2, "collisions": 0, "runs_with_collision": 0, "min_clearance_m": 0.1, "n": 2}
+    expected = {f"plain_{key}": value for key, value in plain.items()}
+    expected |= {f"own_{key}": value for key, value in own.items()}
+    assert found == {"runs": 2} | expected
 
 
 def test_unknown_figures_are_named_with_the_known_ones(capsys):
@@ -122,17 +145,17 @@ def test_a_folder_that_cannot_be_made_is_said_before_the_work(tmp_path, capsys):
 def test_fresh_runs_are_as_near_to_the_law_as_in_figure_7a():
     """Two of its runs: finished, nothing touched, as near to the response on average within 15 mm."""
     law = recordings.figure_eight_task().law
-    for control, end in (("plain", ""), ("pursuit", "_pursuit")):
-        runs = recordings.eight_runs(control, count=2)
-        assert recordings.counts(runs) == {"runs": 2, "finished": 2, "collisions": 0, "runs_with_collision": 0}
+    for kind, (_, choices) in CONTROLS.items():
+        runs = recordings.eight_runs(*choices, count=2)
+        assert [run.finished and not run.collisions for run in runs] == [True, True]
         distance = np.mean([distances_to_law(run, law).mean() for run in runs])
-        assert distance == pytest.approx(COMMITTED["7a"][f"mean_distance_m{end}"], abs=0.015)
+        assert distance == pytest.approx(COMMITTED["7a"][f"{kind}_mean_distance_m"], abs=0.015)
 
 
 @pytest.mark.usefixtures("lab")
 def test_a_fresh_kidnapped_run_goes_round_obstacles_as_in_figure_7b():
     """One of its kind: it finds itself again, finishes and touches nothing."""
-    (run,) = recordings.kidnapped_runs("plain", True, count=1)
+    (run,) = recordings.kidnapped_runs(count=1)
     assert run.finished and not run.collisions and len(run.kidnapped) == 1 and not run.localised.all()
 
 
@@ -141,7 +164,7 @@ def test_fresh_runs_among_moved_cans_finish_as_in_figure_10b():
     """One run in a layout: finished, nothing touched, no nearer than the figure's nearest within 10 cm."""
     (run,) = recordings.moved_runs(0, count=1)
     assert run.finished and not run.collisions
-    assert run.clearance.min() > COMMITTED["10b"]["min_clearance_m"] - 0.1
+    assert run.clearance.min() > COMMITTED["10b"]["own_min_clearance_m"] - 0.1
 
 
 @pytest.mark.usefixtures("lab")
@@ -158,10 +181,10 @@ def test_fresh_runs_of_the_slalom_pass_the_cones_as_in_figure_12b():
 def test_fresh_layouts_are_matched_as_often_as_in_figure_x1():
     """Of sixty layouts of each number of objects about the committed share, both methods; of ten seen by the laser."""
     for row in matching_shares(noises=(0.05,), layouts=60, seed=1).itertuples():
-        assert row.right == pytest.approx(COMMITTED["x1"][f"{row.objects}_objects_{row.method}"], abs=0.2)
+        assert row.right == pytest.approx(COMMITTED["x1"][f"{row.method}_{row.objects}_objects"], abs=0.2)
     for kind in ("cans", "cones"):
         for method, share in recordings.matchings_from_laser(kind, count=10).items():
-            assert share == pytest.approx(COMMITTED["x1"][f"{kind}_seen_{method}"], abs=0.4)
+            assert share == pytest.approx(COMMITTED["x1"][f"{method}_{kind}_seen"], abs=0.4)
 
 
 def test_fresh_demonstrations_are_merged_as_well_as_in_figure_x2():
@@ -170,7 +193,7 @@ def test_fresh_demonstrations_are_merged_as_well_as_in_figure_x2():
     for n in (2, 5):
         merging, mean = (ten.loc[("slalom", 0.15, n, method)] for method in ("merging", "plain mean"))
         assert merging.right_order >= 0.9
-        assert merging.error == pytest.approx(COMMITTED["x2"][f"error_m_{n}_merging"], rel=0.25)
-        assert mean.right_order == pytest.approx(COMMITTED["x2"][f"right_{n}_mean"], abs=0.34)
+        assert merging.error == pytest.approx(COMMITTED["x2"][f"merging_error_m_{n}"], rel=0.25)
+        assert mean.right_order == pytest.approx(COMMITTED["x2"][f"mean_right_{n}"], abs=0.34)
     one = baseline.study(("slalom",), (2,), (0.15,), (0,), ("HMM, BIC",))
-    assert COMMITTED["x2"]["right_2_hmm"] == pytest.approx(one.right_order.mean(), abs=0.67)
+    assert COMMITTED["x2"]["hmm_right_2"] == pytest.approx(one.right_order.mean(), abs=0.67)

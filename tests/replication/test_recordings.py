@@ -1,8 +1,11 @@
 """The replication's experiments: how they judge their own runs."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
+import dollop
 from dollop.replication import recordings
 
 
@@ -12,6 +15,25 @@ def test_sides_are_told_by_the_way_walked():
     cones = np.array([[3.0, -0.7], [6.0, 0.7]])
     assert recordings.passing_sides(path, cones).tolist() == [1, -1]
     assert recordings.passing_sides(path[::-1], cones).tolist() == [-1, 1]
+
+
+@pytest.mark.parametrize("turn", [0, 30, 90, -120, 170])
+def test_a_corner_is_the_angle_between_the_ways_to_and_from_a_subgoal(turn):
+    """Two straight segments: the corner is the turn between them, whichever way, but for the last centimetre."""
+    away = 2 * np.array([np.cos(np.radians(turn)), np.sin(np.radians(turn))])
+    ways = np.linspace([0.0, 0.0], [2.0, 0.0], 40), [2.0, 0.0] + np.linspace([0.0, 0.0], away, 40)
+    law = dollop.SequencedLDS(tuple(dollop.LDS.fit(way) for way in ways), ways[0][0], np.ones(2))
+    assert np.degrees(recordings.largest_corner(law)) == pytest.approx(abs(turn), abs=1.0)
+
+
+def test_the_largest_of_the_corners_counts_and_one_segment_has_none():
+    """A square walked round: three corners of 90 degrees, of which one is flattened to 45."""
+    corners = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [-1, 1]], float)
+    ways = [np.linspace(*ends, 40) for ends in pairwise(corners)]
+    law = dollop.SequencedLDS(tuple(dollop.LDS.fit(way) for way in ways), corners[0], np.ones(4))
+    assert np.degrees(recordings.largest_corner(law)) == pytest.approx(90, abs=1.0)
+    one = dollop.SequencedLDS(law.segments[:1], corners[0], np.ones(1))
+    assert recordings.largest_corner(one) == 0
 
 
 def test_starts_lie_round_the_beginning():

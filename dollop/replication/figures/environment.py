@@ -10,15 +10,16 @@ from dollop.environment import Environment, spring_constants, spring_forces
 from dollop.matching import match
 from dollop.replication import recordings
 from dollop.replication.figures.panel import panel
-from dollop.replication.figures.performing import CONTROLS, at_once, draw_runs, least_clearance
+from dollop.replication.figures.runs import COLUMNS, CONTROLS, at_once, draw_runs, numbers, runs_by_kind
 from dollop.replication.layouts import matching_shares
 
 NEAR = 0.11  # m, how far a label stands off its corner in the drawing
 ASIDE = 1.0, -2.2  # m, by which Fig. 8 draws the boxes of now aside, so that no two lines lie on each other
 WIDE = 10  # inches, figures of three panels
+NOISES = 0.0, 0.025, 0.05, 0.1, 0.15, 0.2  # m, in figure x1
 
 
-@panel("8", own="robust", literal="literal")
+@panel("8", robust="robust", literal="literal")
 def figure_8():
     """The eight objects on the left must be matched to those on the right.
 
@@ -54,14 +55,15 @@ def figure_8():
     ax.set_aspect("equal")
     ax.set_axis_off()
     plot.legend_below(figure, ax)
-    return figure, {
-        "indices": robust.indices.tolist(),
-        "cost": robust.cost,
-        "margin": robust.margin,
-        "indices_literal": literal.indices.tolist(),
-        "cost_literal": literal.cost,
-        "margin_literal": literal.margin,
-    }
+    return figure, matching_numbers(before, after)
+
+
+def matching_numbers(before, after):
+    """Corners, cost and margin of the default matching, and of the paper's literal one."""
+    found = {"": match(before, after), "literal_": match(before, after, method="literal")}
+    measured = {f"{kind}indices": matching.indices.tolist() for kind, matching in found.items()}
+    measured |= {f"{kind}cost": matching.cost for kind, matching in found.items()}
+    return measured | {f"{kind}margin": matching.margin for kind, matching in found.items()}
 
 
 def outwards(environment):
@@ -76,14 +78,14 @@ def label_corners(ax, environment, names, away):
     ax.plot(*environment.corners.T, "o", color="black", markersize=4, zorder=6)
 
 
-@panel("9")
+@panel("9", robust="robust", literal="literal")
 def figure_9():
     """Intuitive representation of the spring optimisation.
 
     Line width grows with the logarithm of the spring constant; arrows are forces. The short springs
     within a box dwarf all others, and each force points into its own box as if there were no second
-    one: this is why the literal matching hangs on the boxes' sizes. The numbers are what these
-    springs lead to: the literal matching of Figure 8.
+    one: this is why the literal matching hangs on the boxes' sizes. The numbers are those of Figure 8;
+    the literal matching is what these springs lead to.
     """
     environment = recordings.figure_eight_task().environment
     corners = environment.corners
@@ -98,8 +100,7 @@ def figure_9():
     right.quiver(*corners.T, *spring_forces(corners).T, color=plot.FORCE, zorder=5, **arrows)
     middle = environment.centres[environment.centres[:, 0].argmin()]
     right.set(xlim=middle[0] + [-0.3, 0.3], ylim=middle[1] + [-0.3, 0.3], title="one box, with the forces", ylabel="")
-    matching = match(environment, recordings.moved_environment(0), method="literal")
-    return figure, {"indices": matching.indices.tolist(), "cost": matching.cost, "margin": matching.margin}
+    return figure, matching_numbers(environment, recordings.moved_environment(0))
 
 
 def draw_springs(ax, corners):
@@ -120,7 +121,6 @@ def figure_10a():
     """
     task, grid = recordings.figure_eight_task(), recordings.background_map()
     figure, axes = plt.subplots(1, len(recordings.LAYOUTS), figsize=(WIDE, 3), sharey=True)
-    right = []
     for k, ax in enumerate(axes):
         adapted = recordings.adapted_task(k)
         plot.workspace(grid, recordings.moved_scene(k).robot, adapted.environment.boxes, ax, f"layout {k + 1}")
@@ -128,10 +128,17 @@ def figure_10a():
         plot.law(ax, adapted.law.response())
         ax.plot(*task.law.subgoals.T, "x", color=plot.BACKGROUND, markeredgewidth=1.5, label="subgoals before")
         plot.subgoals(ax, adapted.law.subgoals)
-        right.append(recordings.matched_right(k))
     show_part(axes, (0.2, 5.3))
     plot.legend_below(figure, axes[0])
-    return figure, {"matching_right": int(sum(right)), "layouts": len(right)}
+    return figure, {"layouts": len(axes)} | adapting()
+
+
+def adapting():
+    """In how many layouts the matching is right, and the largest corner of the adapted laws."""
+    layouts = range(len(recordings.LAYOUTS))
+    corners = [recordings.largest_corner(recordings.adapted_task(k).law) for k in layouts]
+    right = sum(recordings.matched_right(k) for k in layouts)
+    return {"matching_right": right, "largest_corner_deg": np.degrees(max(corners))}
 
 
 def show_part(axes, heights):
@@ -143,7 +150,7 @@ def show_part(axes, heights):
         ax.label_outer()
 
 
-@panel("10b", plain="plain, obstacles ignored", own="pursuit, going round obstacles")
+@panel("10b", **COLUMNS)
 def figure_10b():
     """Performing the task of Figure 6b in modified environments: the robot's runs.
 
@@ -152,22 +159,20 @@ def figure_10b():
     closely, and leaves it only where it is near a can. Clearance is from the robot's rim to the
     nearest obstacle.
     """
-    layouts = range(len(recordings.LAYOUTS))
-    figure, rows = plt.subplots(2, len(layouts), figsize=(WIDE, 4.9), sharex=True, sharey=True)
-    cases = [(k, choices) for _, choices in CONTROLS.values() for k in layouts]
-    runs_of = dict(zip(cases, at_once(recordings.moved_runs, [(k, *choices) for k, choices in cases]), strict=True))
-    metrics = {}
-    for axes, (suffix, (title, choices)) in zip(rows, CONTROLS.items(), strict=True):
-        everything = [runs_of[k, choices] for k in layouts]
+    figure, rows = plt.subplots(2, len(recordings.LAYOUTS), figsize=(WIDE, 4.9), sharex=True, sharey=True)
+    runs_of = runs_by_kind(runs_in_every_layout)
+    for axes, (kind, (title, _)) in zip(rows, CONTROLS.items(), strict=True):
         for k, ax in enumerate(axes):
-            draw_runs(ax, recordings.adapted_task(k), everything[k], f"layout {k + 1}")
+            draw_runs(ax, recordings.adapted_task(k), runs_of[kind][k], f"layout {k + 1}")
         axes[1].set_title(f"{title}\nlayout 2")
-        runs = sum(everything, [])
-        numbers = recordings.counts(runs) | {"min_clearance_m": least_clearance(runs)}
-        metrics = {f"{key}{suffix}": value for key, value in numbers.items()} | metrics
     show_part(rows.flat, (1.3, 5.3))
     plot.legend_below(figure, *rows.flat)
-    return figure, {"matching_right": int(sum(recordings.matched_right(k) for k in layouts))} | metrics
+    return figure, adapting() | numbers({kind: sum(runs, []) for kind, runs in runs_of.items()})
+
+
+def runs_in_every_layout(control, avoid):
+    """Runs of the adapted task, a list for each layout."""
+    return [recordings.moved_runs(k, control, avoid) for k in range(len(recordings.LAYOUTS))]
 
 
 @panel("x1", literal="literal", robust="robust")
@@ -179,23 +184,33 @@ def figure_x1():
     and cones that the simulated laser sees, each layout matched to the first: a laser sees one side
     of a can and is off by some centimetres.
     """
-    shares = matching_shares(noises=(0.0, 0.025, 0.05, 0.1, 0.15, 0.2), layouts=300, seed=recordings.SEED)
+    shares = matching_shares(noises=NOISES, layouts=300, seed=recordings.SEED)
+    seen = at_once(recordings.matchings_from_laser, [("cans",), ("cones",)])
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), width_ratios=(2, 1), sharey=True)
+    draw_shares_by_noise(left, shares)
+    draw_shares_seen(right, dict(zip(("2 cans", "4 cones"), seen, strict=True)))
+    known = shares[shares.noise == 0.05]
+    measured = {f"{row.method}_{row.objects}_objects": row.right for row in known.itertuples()}
+    for kind, share in zip(("cans", "cones"), seen, strict=True):
+        measured |= {f"{method}_{kind}_seen": right for method, right in share.items()}
+    return figure, measured
+
+
+def draw_shares_by_noise(ax, shares):
+    """Share of random layouts all right against the noise of their boxes, by method and number of objects."""
     for (method, objects), rows in shares.groupby(["method", "objects"]):
         look = {"color": plot.METHODS[method], "marker": {2: "o", 3: "s", 4: "^"}[objects]}
-        left.plot(rows.noise, rows.right, label=f"{method}, {objects} objects", **look)
-    left.set(xlabel="box sizes off by up to [m]", ylabel="share of layouts all right", ylim=(0, 1.08))
-    left.set_title("random boxes")
-    left.legend(ncols=2, loc="center right", bbox_to_anchor=(1.0, 0.68))
-    seen = at_once(recordings.matchings_from_laser, [("cans",), ("cones",)])
-    by_laser = dict(zip(("2 cans", "4 cones"), seen, strict=True))
+        ax.plot(rows.noise, rows.right, label=f"{method}, {objects} objects", **look)
+    ax.set(xlabel="box sizes off by up to [m]", ylabel="share of layouts all right", ylim=(0, 1.08))
+    ax.set_title("random boxes")
+    ax.legend(ncols=2, loc="center right", bbox_to_anchor=(1.0, 0.68))
+
+
+def draw_shares_seen(ax, by_laser):
+    """Bars: the share of layouts all right, by what the laser saw and by method."""
     for k, method in enumerate(("literal", "robust")):
         found = [share[method] for share in by_laser.values()]
-        bars = right.bar(np.arange(2) + 0.4 * k, found, 0.38, color=plot.METHODS[method], label=method)
-        right.bar_label(bars, fmt="%.2f")
-    right.set_xticks(np.arange(2) + 0.2, by_laser)
-    right.set_title("boxes as the laser sees them")
-    known = shares[shares.noise == 0.05]
-    return figure, {f"{row.objects}_objects_{row.method}": row.right for row in known.itertuples()} | {
-        f"{kind.split()[1]}_seen_{method}": share for kind, found in by_laser.items() for method, share in found.items()
-    }
+        bars = ax.bar(np.arange(2) + 0.4 * k, found, 0.38, color=plot.METHODS[method], label=method)
+        ax.bar_label(bars, fmt="%.2f")
+    ax.set_xticks(np.arange(2) + 0.2, by_laser)
+    ax.set_title("boxes as the laser sees them")

@@ -8,7 +8,8 @@ from scipy.stats import binomtest
 from dollop import plot
 from dollop.replication import baseline, recordings
 from dollop.replication.figures.panel import panel
-from dollop.replication.figures.performing import CONTROLS, at_once, draw_runs, least_clearance
+from dollop.replication.figures.performing import law_numbers
+from dollop.replication.figures.runs import COLUMNS, CONTROLS, at_once, draw_runs, numbers, runs_by_kind
 
 SIZE = (6, 5.2)
 SPREAD = 0.15  # m, standard deviation of a subgoal in figure x2
@@ -93,12 +94,12 @@ def measured(table):
     metrics = {}
     for (method, n), rows in table[table.n.isin(FEW)].groupby(["method", "n"], sort=False):
         name = LINES[method][0]
-        metrics |= {f"seeds_{name}": len(rows), f"right_{n}_{name}": rows.right_order.mean()}
+        metrics |= {f"{name}_seeds": len(rows), f"{name}_right_{n}": rows.right_order.mean()}
         if rows.right_number.any():
-            metrics[f"error_m_{n}_{name}"] = rows.error.mean()
+            metrics[f"{name}_error_m_{n}"] = rows.error.mean()
     error = table[table.method == "merging"].groupby("n").error.mean()
-    metrics["exponent_merging"] = np.polyfit(np.log(error.index), np.log(error), 1)[0]
-    metrics["error_by_expected_merging"] = (error / expected_error(error.index)).mean()
+    metrics["merging_exponent"] = np.polyfit(np.log(error.index), np.log(error), 1)[0]
+    metrics["merging_error_by_expected"] = (error / expected_error(error.index)).mean()
     return metrics
 
 
@@ -131,7 +132,7 @@ def draw_demonstration(k):
     plot.path(ax, walk, "user's track", linewidth=1)
     plot.subgoals(ax, shown.law.subgoals)
     plot.legend_below(figure, ax)
-    return figure, {"n_segments": len(shown.law.segments), "mean_error_m": shown.law.error(walk)}
+    return figure, law_numbers(shown.law, [walk])
 
 
 @panel("12a")
@@ -160,7 +161,7 @@ def figure_12a():
     }
 
 
-@panel("12b", plain="plain, obstacles ignored", own="pursuit, going round obstacles")
+@panel("12b", **COLUMNS)
 def figure_12b():
     """The result after mapping the subgoals to a new environment.
 
@@ -171,20 +172,25 @@ def figure_12b():
     it goes round what is in the way, and that alone is why nothing is touched. The circles are the
     robot where it first touches something.
     """
-    task, shown = recordings.new_slalom_task(), recordings.slalom_demonstration(0)
-    sides = recordings.passing_sides(shown.law.response(), shown.environment.centres)
+    task, runs_of = recordings.new_slalom_task(), runs_by_kind(recordings.slalom_runs)
     figure, axes = plt.subplots(2, 1, figsize=(8, 6.4), sharex=True)
-    metrics = {}
-    runs_of = at_once(recordings.slalom_runs, [choices for _, choices in CONTROLS.values()])
-    for ax, (suffix, (title, _)), runs in zip(axes, CONTROLS.items(), runs_of, strict=True):
-        draw_runs(ax, task, runs, title)
+    for ax, (kind, (title, _)) in zip(axes, CONTROLS.items(), strict=True):
+        draw_runs(ax, task, runs_of[kind], title)
         plot.subgoals(ax, task.law.subgoals)
         ax.set(xlim=(0.6, 8.4), ylim=(2.2, 4.8))
-        numbers = recordings.counts(runs) | {"min_clearance_m": least_clearance(runs)}
-        metrics = {f"{key}{suffix}": value for key, value in numbers.items()} | metrics
-    # Not asked of the plain law's runs: a robot that backs off the cone it touched faces any way
-    # there.
-    metrics["passed_on_the_demonstrated_side"] = sum(recordings.same_sides(run, task, sides) for run in runs_of[-1])
     axes[0].set_xlabel("")
     plot.legend_below(figure, *axes)
-    return figure, metrics
+    return figure, numbers(runs_of) | {
+        "own_passed_on_the_demonstrated_side": passed_rightly(runs_of["own"]),
+        "largest_corner_deg": np.degrees(recordings.largest_corner(task.law)),
+    }
+
+
+def passed_rightly(runs):
+    """How many runs pass every cone on the demonstrated side.
+
+    Not asked of the plain law's runs: a robot that backs off the cone it touched faces any way there.
+    """
+    shown = recordings.slalom_demonstration(0)
+    sides = recordings.passing_sides(shown.law.response(), shown.environment.centres)
+    return sum(recordings.same_sides(run, recordings.new_slalom_task(), sides) for run in runs)

@@ -21,8 +21,8 @@ class Panel:
     draw : callable
         Takes nothing and returns the matplotlib figure and a dict of its numbers.
     columns : dict
-        Where the numbers are of several things: how their names end in metrics.json, and what each
-        thing is.
+        Where the numbers are of several things: how their names begin in metrics.json, and what
+        each thing is. A number without such a beginning is of all that have none of their own.
     """
 
     id: str
@@ -64,10 +64,9 @@ def panel(id, **columns):
     callable
         The decorator; the drawing stays what it is.
     """
-    ends = {"" if end == "own" else f"_{end}": words for end, words in columns.items()}
 
     def register(draw):
-        PANELS[id] = Panel(id, draw, ends)
+        PANELS[id] = Panel(id, draw, columns)
         return draw
 
     return register

@@ -1,21 +1,20 @@
 """Figures 6b and 7: the control law, and the robot that performs it (Sec. III)."""
 
-import joblib
 import matplotlib.pyplot as plt
 import numpy as np
 
 from dollop import plot
+from dollop.pose import wrapped
 from dollop.replication import recordings
 from dollop.replication.figures.panel import panel
+from dollop.replication.figures.runs import COLUMNS, CONTROLS, draw_runs, numbers, runs_by_kind
 from dollop.robot.performing import distances_to_law, return_times
-from dollop.trajectory import distance_to_polyline, mean_trajectory
+from dollop.trajectory import mean_trajectory
+
+__all__ = ["law_numbers"]
 
 SIZE = (6, 5.2)
 PAIR = (10, 4.7)
-CONTROLS = {  # suffix in the metrics: what it is, and how the robot is asked for it
-    "_plain": ("the paper's kind of control: plain, obstacles ignored", ("plain", False)),
-    "": ("Dollop's own: pursuit, going round obstacles", ("pursuit", True)),
-}
 
 
 @panel("6b")
@@ -37,92 +36,91 @@ def figure_6b():
     plot.subgoals(ax, law.subgoals)
     plot.legend_below(figure, ax)
     return figure, {
-        "n_segments": len(law.segments),
-        "mean_error_m": distance_to_polyline(mean_trajectory(laps), law.response()).mean(),
+        **law_numbers(law, laps),
         "mean_error_laps_m": np.mean([law.error(lap) for lap in laps]),
         "tolerance_m": 0.02,
+        "largest_corner_deg": np.degrees(recordings.largest_corner(law)),
     }
 
 
-@panel("7a", own="plain law", pursuit="pursuit")
+def law_numbers(law, walks):
+    """Number of segments of a law, and its mean distance in m from the mean of the walks behind it.
+
+    Parameters
+    ----------
+    law : SequencedLDS
+    walks : list of (N_k, 2) float arrays
+        In m.
+
+    Returns
+    -------
+    dict
+    """
+    return {"n_segments": len(law.segments), "mean_error_m": law.error(mean_trajectory(walks))}
+
+
+@panel("7a", **COLUMNS)
 def figure_7a():
     """Ten runs of Agent Orange performing the estimated trajectory of Figure 6b.
 
-    Left the paper's kind of law, which points along the response and knows nothing of wheels, so
-    that the robot swings wide in the curves; right the one that respects the robot's dynamics. The
-    fan is the starts, each a little off. Distances are from the robot to the response from where
-    that run started, not to the green line, which starts where the laps do.
+    Left the paper's kind of control, which points along the response and knows nothing of wheels, so
+    that the robot swings wide in the curves; right Dollop's own, which respects the robot's dynamics
+    and would go round obstacles, but here it meets none. The fan is the starts, each a little off.
+    Distances are from the robot to the response from where that run started, not to the green line,
+    which starts where the laps do.
     """
-    task = recordings.figure_eight_task()
+    figure, runs_of = draw_both(recordings.eight_runs)
+    return figure, numbers(runs_of, how_near)
+
+
+def draw_both(work):
+    """A figure of the figure-eight's runs under both kinds of control, and these runs by kind."""
+    task, runs_of = recordings.figure_eight_task(), runs_by_kind(work)
     figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
-    metrics = {}
-    titles = {"plain": "plain: points along the response", "pursuit": "pursuit: respects the robot's dynamics"}
-    runs_of = at_once(recordings.eight_runs, [(control,) for control in titles])
-    for ax, (control, title), runs in zip(axes, titles.items(), runs_of, strict=True):
-        draw_runs(ax, task, runs, title)
-        distances = np.concatenate([distances_to_law(run, task.law) for run in runs])
-        errors = [pose_errors(run) for run in runs]
-        metrics[control] = {
-            **recordings.counts(runs),
-            "mean_distance_m": distances.mean(),
-            "max_distance_m": distances.max(),
-            "min_clearance_m": least_clearance(runs),
-            "localisation_error_m": np.mean([place for place, _ in errors]),
-            "localisation_error_deg": np.degrees(np.mean([turn for _, turn in errors])),
-        }
-    plot.legend_below(figure, axes[0])
-    return figure, metrics["plain"] | {f"{key}_pursuit": value for key, value in metrics["pursuit"].items()}
-
-
-@panel("7b", own="plain law", aware="plain law, going round obstacles")
-def figure_7b():
-    """The response of Agent Orange after being kidnapped.
-
-    Five runs, a shade and dashes each. A dotted line leads to where the robot was carried, and the
-    number there is the run's, the same left and right. The plain law heads for the active subgoal
-    through whatever is in the way, and the circle is the robot where that first ends in a contact;
-    that the paper's robot hit nothing was, as it says, a coincidence. Right the same law, which now
-    goes round obstacles: nothing else differs. One run may touch an obstacle several times, so
-    contacts and runs with a contact are counted apart. Time to return: until the robot is within
-    ten centimetres of the response from its start and stays there for a second.
-    """
-    task = recordings.figure_eight_task()
-    figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
-    metrics = {}
-    titles = {"plain": "plain, obstacles ignored", "aware": "plain, going round obstacles"}
-    runs_of = at_once(recordings.kidnapped_runs, [("plain", False), ("plain", True)])
-    for ax, (name, title), runs in zip(axes, titles.items(), runs_of, strict=True):
-        draw_runs(ax, task, runs, title)
-        times = np.concatenate([return_times(run, task.law) for run in runs])
-        back = times[np.isfinite(times)]
-        metrics[name] = recordings.counts(runs) | {
-            "return_time_s": back.mean() if len(back) else None,
-            "min_clearance_m": least_clearance(runs),
-        }
+    for ax, (kind, (title, _)) in zip(axes, CONTROLS.items(), strict=True):
+        draw_runs(ax, task, runs_of[kind], title)
     plot.legend_below(figure, *axes)
-    return figure, metrics["plain"] | {f"{key}_aware": value for key, value in metrics["aware"].items()}
+    return figure, runs_of
 
 
-def at_once(work, arguments):
-    """What `work` returns for each of some arguments, two at a time: the numbers are the same,
-    seeds being fixed.
-    """
-    return joblib.Parallel(n_jobs=2)(joblib.delayed(work)(*each) for each in arguments)
-
-
-def draw_runs(ax, task, runs, title):
-    """The law, and the runs of the robot over it."""
-    plot.workspace(recordings.background_map(), None, task.environment.boxes, ax, title)
-    plot.law(ax, task.law.response())
-    plot.runs(ax, runs)
-
-
-def least_clearance(runs):
-    """The least distance in m that any of the runs left between the robot's rim and an obstacle."""
-    return min(run.clearance.min() for run in runs)
+def how_near(runs):
+    """How far the runs of the figure-eight are from the response, and their estimated poses from the true ones."""
+    law = recordings.figure_eight_task().law
+    distances = np.concatenate([distances_to_law(run, law) for run in runs])
+    places, turns = np.transpose([pose_errors(run) for run in runs])
+    return {
+        "mean_distance_m": distances.mean(),
+        "max_distance_m": distances.max(),
+        "localisation_error_m": places.mean(),
+        "localisation_error_deg": np.degrees(turns.mean()),
+    }
 
 
 def pose_errors(run):
     """Mean errors of the estimated pose while the robot trusts it: m and rad."""
     off = (run.poses - run.true_poses)[run.localised]
-    return np.hypot(off[:, 0], off[:, 1]).mean(), np.abs(np.angle(np.exp(1j * off[:, 2]))).mean()
+    return np.hypot(off[:, 0], off[:, 1]).mean(), np.abs(wrapped(off[:, 2])).mean()
+
+
+@panel("7b", **COLUMNS)
+def figure_7b():
+    """The response of Agent Orange after being kidnapped.
+
+    Five runs, a shade and dashes each. A dotted line leads to where the robot was carried, and the
+    number there is the run's, the same left and right. Left the paper's kind of control: it heads for
+    the active subgoal through whatever is in the way, and the circle is the robot where that first
+    ends in a contact; that the paper's robot hit nothing was, as it says, a coincidence. Right
+    Dollop's own, which goes round obstacles. One run may touch an obstacle several times, so contacts
+    and runs with a contact are counted apart. Time to return: until the robot is within ten
+    centimetres of the response from its start and stays there for a second.
+    """
+    figure, runs_of = draw_both(recordings.kidnapped_runs)
+    return figure, numbers(runs_of, how_soon)
+
+
+def how_soon(runs):
+    """Mean time in s until the kidnapped robots are back on the response, None if none ever is."""
+    law = recordings.figure_eight_task().law
+    times = np.concatenate([return_times(run, law) for run in runs])
+    back = times[np.isfinite(times)]
+    return {"return_time_s": back.mean() if len(back) else None}
