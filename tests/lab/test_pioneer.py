@@ -1,23 +1,100 @@
-"""Agent Orange in the laboratory: it knows where it is from odometry and laser alone, performs, and is kidnapped."""
+"""The Pioneer: it obeys commands, and finds itself by odometry and laser, performs, is kidnapped."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-pytest.importorskip("pybullet", reason="the laboratory needs PyBullet")
+pytest.importorskip("pybullet", reason="the laboratory needs PyBullet (extra `lab`)")
 
 from rooms import figure_eight
 
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.lab.pioneer import Pioneer
-from dollop.lab.scenes import BACKGROUND, BEAM_HEIGHT, ROOM, figure_eight_scene
+from dollop.lab.scenes import BACKGROUND, BEAM_HEIGHT, ROOM, empty_scene, figure_eight_scene
 from dollop.lab.world import World
+from dollop.pose import moved_pose
+from dollop.robot.control import PIONEER_LIMITS
 from dollop.robot.performing import perform
 from dollop.sequenced_lds import SequencedLDS
 
 START = (4.5, 3.6, -0.7)
+
+
+@pytest.fixture(scope="module")
+def empty():
+    """The laboratory without foreground objects."""
+    with World(empty_scene()) as world:
+        yield world
+
+
+@pytest.fixture
+def robot(empty):
+    """A Pioneer at rest in the middle of the room."""
+    robot = Pioneer(empty, (4.5, 3.0, 0.0), limits=PIONEER_LIMITS._replace(turn=1.75))
+    yield robot
+    empty.call("removeBody", robot.body)
+
+
+def drive(robot, speed, turn, duration):
+    """Drive with the same command for `duration` s."""
+    for _ in range(round(duration / robot.period)):
+        robot.drive(speed, turn)
+
+
+def velocity(robot):
+    """True forward speed in m/s and turning rate in rad/s of the middle of the axle."""
+    (vx, vy, _), (_, _, turn) = robot.world.call("getBaseVelocity", robot.body)
+    theta = robot.true_pose[2]
+    return vx * np.cos(theta) + vy * np.sin(theta), turn
+
+
+@pytest.mark.parametrize(("speed", "turn"), [(0.4, 0.0), (0.0, 1.0), (0.4, 0.5), (0.3, -0.8), (-0.3, 0.2)])
+def test_the_pioneer_drives_the_commanded_arc(robot, speed, turn):
+    """Once up to speed, two seconds are the commanded arc within two per cent and a centimetre."""
+    drive(robot, speed, turn, 1.5)
+    start = robot.pose
+    drive(robot, speed, turn, 2.0)
+    expected = start
+    for _ in range(200):  # an arc of many short chords
+        expected = moved_pose(expected, speed * 0.01, turn * 0.01)
+    off = robot.pose - expected
+    assert np.linalg.norm(off[:2]) < 0.01 + 0.02 * abs(speed) * 2.0
+    assert abs(np.angle(np.exp(1j * off[2]))) < 0.01 + 0.02 * abs(turn) * 2.0
+
+
+def test_the_pioneer_respects_its_limits(robot):
+    """From rest to full speed takes speed / acceleration, and no command exceeds the limits."""
+    drive(robot, 10.0, 10.0, 0.5)
+    speed, turn = velocity(robot)
+    assert speed == pytest.approx(0.25, abs=0.02) and turn == pytest.approx(0.785, abs=0.08)
+    robot.place((4.5, 3.0, 0.0))
+    drive(robot, 10.0, 0.0, 2.0)
+    assert velocity(robot)[0] == pytest.approx(0.5, abs=0.01)
+
+
+def test_odometry_is_near_the_truth_but_not_equal(robot):
+    """After a drive the odometry is off by less than five per cent of the way, and not by nothing."""
+    drive(robot, 0.4, 0.3, 5.0)
+    off = np.linalg.norm(robot.odometry[:2] - robot.true_pose[:2])
+    assert 1e-4 < off < 0.05 * 2.0
+
+
+def test_without_a_map_the_pioneer_believes_the_truth(robot):
+    """What it believes is where it is, at rest and after a drive, and it trusts that."""
+    drive(robot, 0.4, 0.3, 1.0)
+    assert robot.pose == robot.true_pose != tuple(robot.odometry) and robot.localised
+
+
+def test_a_collision_is_felt(robot):
+    """Driving against the wall the robot touches it and stops before it; driving free, nothing."""
+    drive(robot, 0.4, 0.0, 1.0)
+    assert robot.touching is False
+    robot.place((4.5, 0.8, -np.pi / 2))
+    drive(robot, 0.4, 0.0, 4.0)
+    assert robot.touching is True
+    assert 0.1 < robot.pose[1] < 0.3
 
 
 @pytest.fixture(scope="module")
