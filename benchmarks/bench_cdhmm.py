@@ -1,19 +1,18 @@
-"""How long merging demonstrations takes, beside a plain loop over pairs: python -m benchmarks cdhmm."""
+"""How long merging demonstrations takes, beside a plain loop: python -m benchmarks cdhmm."""
 
 from math import inf, lgamma, log, pi
 
 import numpy as np
 
 from benchmarks.timing import row, seconds
-from dollop.cdhmm import SubgoalHMM
-from dollop.replication.baseline import draw_demonstrations
+from dollop.replication.baseline import draw_demonstrations, merged
 
 TASK = np.random.default_rng(0).uniform(-4, 4, (10, 2))  # ten subgoals in a room of 8 m
 CASES = ((10, 0.05, 7), (100, 2.0, 3))  # demonstrations, bound in s, repetitions
 
 
 def run():
-    """Time `SubgoalHMM.fit` with the most-likely path.
+    """Time merging with the most-likely path, as the comparison of learners calls it.
 
     Returns
     -------
@@ -23,14 +22,10 @@ def run():
     rows = []
     for n, bound, repeats in CASES:
         demonstrations = draw_demonstrations(TASK, n, 0.1, seed=1)
-        median, _ = seconds(lambda shown=demonstrations: fit(shown), repeats)
+        median, _ = seconds(lambda shown=demonstrations: merged(shown), repeats)
         baseline = seconds(lambda shown=demonstrations: plain_loop(shown), 1)[0] if n <= 10 else None
         rows.append(row(f"merge {n} demonstrations of 10 subgoals", median, baseline, bound))
     return rows
-
-
-def fit(demonstrations):
-    SubgoalHMM.fit(demonstrations).most_likely_path()
 
 
 def plain_loop(demonstrations, spread=0.15):

@@ -1,5 +1,4 @@
-"""What merging (`dollop.cdhmm.model`) is measured against: hidden Markov models of a chosen size,
-and the plain mean.
+"""Learners of a task's structure compared: merging, hidden Markov models and the plain mean.
 
 Demonstrations of known tasks are drawn with subgoals that scatter and, now and then, one subgoal
 that is no part of the task. Every method gets the same demonstrations and says what it takes for
@@ -12,25 +11,39 @@ from functools import partial
 from itertools import groupby, product
 from time import process_time
 
+import joblib
 import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
 from dollop.cdhmm import SubgoalHMM
 
-TASKS = {  # subgoals in m, six each
+__all__ = [
+    "METHODS",
+    "TASKS",
+    "draw_demonstrations",
+    "gaussian_hmm",
+    "judge",
+    "merged",
+    "plain_mean",
+    "study",
+    "summary",
+]
+
+TASKS = {
     "slalom": ((0.0, 0.0), (1.5, 0.9), (3.0, -0.9), (4.5, 0.9), (6.0, -0.9), (7.5, 0.0)),
     "figure-eight": ((-2.0, 0.0), (0.0, 0.0), (1.5, 1.2), (3.0, 0.0), (0.0, 0.0), (-1.5, 1.2)),
     "ring": tuple((2 * np.cos(a), 2 * np.sin(a)) for a in np.arange(6) * np.pi / 3),
 }
+"""The true subgoals of each task in m, six each."""
 
 
 def draw_demonstrations(task, n, spread, extra=0.3, seed=0):
-    """Draw demonstrations of a task: each subgoal scattered, and in some of them one more that is
-    no part of it.
+    """Draw demonstrations of a task: subgoals that scatter, and in some of them one too many.
 
-    The additional subgoal comes anywhere in the order, before the first and after the last
-    included. Its position is anywhere within the task's bounding box widened by half a metre.
+    A set-up of our own, for the paper compares its learning with nothing. The additional subgoal
+    comes anywhere in the order, before the first and after the last included. Its position is
+    anywhere within the task's bounding box widened by half a metre.
 
     Parameters
     ----------
@@ -53,7 +66,8 @@ def draw_demonstrations(task, n, spread, extra=0.3, seed=0):
     demonstrations = []
     for _ in range(n):
         subgoals = task + random.normal(0, spread, task.shape)
-        position, stray, has_one = random.integers(len(task) + 1), random.uniform(low, high), random.random() < extra
+        position, stray = random.integers(len(task) + 1), random.uniform(low, high)
+        has_one = random.random() < extra
         demonstrations.append(np.insert(subgoals, position, stray, axis=0) if has_one else subgoals)
     return demonstrations
 
@@ -62,14 +76,36 @@ def draw_demonstrations(task, n, spread, extra=0.3, seed=0):
 
 
 def merged(sequences, spread=0.15):
-    """Subgoals on the most-likely path of a `SubgoalHMM`: (L, 2) in m."""
+    """What merging takes for the task: the subgoals on a CDHMM's most-likely path (Sec. V).
+
+    Parameters
+    ----------
+    sequences : sequence of (K, 2) array_like
+        Subgoals of each demonstration in m.
+    spread : float
+        Expected standard deviation of a subgoal along each axis in m.
+
+    Returns
+    -------
+    (L, 2) float array
+        In m.
+    """
     model = SubgoalHMM.fit(sequences, spread)
     return model.means[model.most_likely_path()]
 
 
 def plain_mean(sequences):
-    """Mean of the demonstrations, subgoal by subgoal, after stretching each to their median length:
-    (L, 2) in m.
+    """Mean of the demonstrations, subgoal by subgoal, each stretched to their median length.
+
+    Parameters
+    ----------
+    sequences : sequence of (K, 2) array_like
+        Subgoals of each demonstration in m.
+
+    Returns
+    -------
+    (L, 2) float array
+        In m.
     """
     length = int(np.median([len(sequence) for sequence in sequences]))
     return np.mean([_stretch(np.asarray(sequence, float), length) for sequence in sequences], axis=0)
@@ -83,6 +119,7 @@ def _stretch(sequence, length):
 def gaussian_hmm(sequences, left_to_right=False, n_states=range(2, 11), restarts=5, seed=0, spread=0.15):
     """Subgoals by hidden Markov models of hmmlearn, the number of states chosen by BIC.
 
+    A general method, set up as its own advocate would: it is told the spread that merging is told.
     Expectation-maximisation from several random starts for each number of states; the best of each
     is compared by BIC. The task is the sequence of states that the most demonstrations follow
     (Viterbi, repetitions dropped), the shorter where several do.
@@ -167,10 +204,18 @@ METHODS = {
     "left-to-right HMM, BIC": partial(gaussian_hmm, left_to_right=True),
     "plain mean": plain_mean,
 }
+"""From sequences of subgoals in m to what each method takes for the task, (L, 2) in m."""
 
 
 def judge(found, task):
-    """Compare subgoals found (L, 2) with the true ones (K, 2), in m.
+    """Compare subgoals found with the true ones.
+
+    Parameters
+    ----------
+    found : (L, 2) array_like
+        In m.
+    task : (K, 2) array_like
+        In m.
 
     Returns
     -------
@@ -187,20 +232,23 @@ def judge(found, task):
     return {"right_number": True, "right_order": bool((own <= distances.min(1)).all()), "error": own.mean()}
 
 
-def study(tasks=tuple(TASKS), numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=range(100), methods=tuple(METHODS)):
-    """Let every method find every task from the same demonstrations, one subgoal too many in 30 %
-    of them.
+def study(tasks=tuple(TASKS), numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=range(100), methods=METHODS, jobs=1):
+    """Let every method find every task from the same demonstrations, 30 % with a subgoal too many.
 
     Parameters
     ----------
-    tasks, methods : sequence of str
-        Names in `TASKS` and `METHODS`.
+    tasks : sequence of str
+        Names in `TASKS`.
     numbers : sequence of int
         Numbers of demonstrations.
     spreads : sequence of float
         Standard deviation of a subgoal along each axis in m. The methods are not told; they expect
         their default.
     seeds : sequence of int
+    methods : dict
+        Functions like those in `METHODS`, by name.
+    jobs : int
+        How many cases are worked on at once; the numbers but for the times stay the same.
 
     Returns
     -------
@@ -208,21 +256,33 @@ def study(tasks=tuple(TASKS), numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=ra
         One row per task, number `n`, `spread`, `seed` and `method`: what `judge` says, `length` of
         the path found, and `seconds` of processor time it took.
     """
-    cases = list(product(tasks, numbers, spreads, seeds))
-    rows = []
-    for name, n, spread, seed in tqdm(cases, desc="structure study"):
-        demonstrations = draw_demonstrations(TASKS[name], n, spread, seed=seed)
-        for method in methods:
-            begin = process_time()
-            found = METHODS[method](demonstrations)
-            case = {"task": name, "n": n, "spread": spread, "seed": seed, "method": method, "length": len(found)}
-            rows.append(case | judge(found, TASKS[name]) | {"seconds": process_time() - begin})
-    return pd.DataFrame(rows)
+    cases = tqdm(list(product(tasks, numbers, spreads, seeds, methods)), desc="structure study")
+    calls = (joblib.delayed(_trial)(*case, methods[case[-1]]) for case in cases)
+    return pd.DataFrame(joblib.Parallel(n_jobs=jobs)(calls))
+
+
+def _trial(task, n, spread, seed, method, find):
+    """A row of the study: what one method makes of one set of demonstrations."""
+    demonstrations = draw_demonstrations(TASKS[task], n, spread, seed=seed)
+    begin = process_time()
+    found = find(demonstrations)
+    taken = process_time() - begin
+    case = {"task": task, "n": n, "spread": spread, "seed": seed, "method": method}
+    return case | {"length": len(found)} | judge(found, TASKS[task]) | {"seconds": taken}
 
 
 def summary(table):
-    """Shares of right number and right order, mean error in m and median seconds, by task, spread,
-    n and method.
+    """Shares of right number and order, mean error in m and median seconds.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        From `study`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns right_number, right_order, error and seconds, by task, spread, n and method.
     """
     groups = table.groupby(["task", "spread", "n", "method"], sort=False)
     return groups.agg(

@@ -9,12 +9,14 @@ from dollop.replication.baseline import (
     draw_demonstrations,
     gaussian_hmm,
     judge,
+    merged,
     plain_mean,
     study,
     summary,
 )
 
 SLALOM = np.array(TASKS["slalom"])
+QUICK = {"merging": merged, "plain mean": plain_mean}
 
 
 def test_demonstrations_scatter_as_told():
@@ -66,7 +68,7 @@ def test_hidden_markov_model_finds_what_is_plain(left_to_right):
 
 def test_study_compares_all_methods_on_the_same_demonstrations():
     """Every method judges every case once; on two demonstrations merging is right more often than the plain mean."""
-    table = study(tasks=("slalom",), numbers=(2,), spreads=(0.15,), seeds=range(25), methods=("merging", "plain mean"))
+    table = study(tasks=("slalom",), numbers=(2,), spreads=(0.15,), seeds=range(25), methods=QUICK)
     shares = summary(table).loc[("slalom", 0.15, 2)]
     assert len(table) == 50
     assert shares.loc["merging", "right_order"] >= 0.95
@@ -79,3 +81,10 @@ def test_study_knows_every_method():
     table = study(tasks=("ring",), numbers=(2,), spreads=(0.05,), seeds=(3,))
     assert table["method"].tolist() == list(METHODS)
     assert table[["task", "n", "spread", "seed"]].drop_duplicates().to_numpy().tolist() == [["ring", 2, 0.05, 3]]
+
+
+def test_two_at_once_find_the_same():
+    """Jobs share the cases out and change no number but the times; rows keep their order."""
+    asked = (("slalom", "ring"), (2, 3), (0.15,), range(3), QUICK)
+    one, two = (study(*asked, jobs=jobs).drop(columns="seconds") for jobs in (1, 2))
+    assert one.equals(two) and len(one) == 24

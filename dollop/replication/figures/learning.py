@@ -9,7 +9,7 @@ from dollop import plot
 from dollop.replication import baseline, recordings
 from dollop.replication.figures.panel import panel
 from dollop.replication.figures.performing import law_numbers
-from dollop.replication.figures.runs import COLUMNS, CONTROLS, at_once, draw_runs, numbers, runs_by_kind
+from dollop.replication.figures.runs import COLUMNS, CONTROLS, draw_runs, numbers, runs_by_kind
 
 SIZE = (6, 5.2)
 SPREAD = 0.15  # m, standard deviation of a subgoal in figure x2
@@ -49,24 +49,16 @@ def figure_x2():
 
 
 def found_by_all():
-    """What each method finds, from each number of demonstrations and each seed: a row each."""
-    cases = [
-        (method, n, seed) for method, (_, _, seeds, numbers) in LINES.items() for n in numbers for seed in range(seeds)
-    ]
-    return pd.DataFrame(at_once(found, cases))
-
-
-def found(method, n, seed):
-    """How right a method is about the slalom from n demonstrations of it."""
-    task = baseline.TASKS["slalom"]
-    demonstrations = baseline.draw_demonstrations(task, n, SPREAD, seed=seed)
-    return {"method": method, "n": n} | baseline.judge(baseline.METHODS[method](demonstrations), task)
+    """The comparison of structure learners (`baseline.study`) on the slalom, a row each."""
+    parts = []
+    for method, (_, _, seeds, sizes) in LINES.items():
+        learner = {method: baseline.METHODS[method]}
+        parts.append(baseline.study(("slalom",), sizes, (SPREAD,), range(seeds), learner, jobs=2))
+    return pd.concat(parts)
 
 
 def expected_error(n):
-    """Mean distance in m of the mean of n subgoals to the true one: that of a Rayleigh
-    distribution.
-    """
+    """Mean distance in m of the mean of n subgoals to the true one: a Rayleigh distribution's."""
     return SPREAD * np.sqrt(np.pi / 2 / n)
 
 
@@ -88,9 +80,7 @@ def draw_errors(ax, method, rows):
 
 
 def measured(table):
-    """Shares, errors and seeds by method for a few numbers of demonstrations, and how merging's
-    error falls with n.
-    """
+    """Shares, errors and seeds by method for a few n, and how merging's error falls with n."""
     metrics = {}
     for (method, n), rows in table[table.n.isin(FEW)].groupby(["method", "n"], sort=False):
         name = LINES[method][0]
