@@ -1,4 +1,4 @@
-"""The Pioneer: it obeys commands, and finds itself by odometry and laser, performs, is kidnapped."""
+"""The Pioneer: it obeys, finds itself by odometry and laser, performs, and is kidnapped."""
 
 from types import SimpleNamespace
 
@@ -50,7 +50,10 @@ def velocity(robot):
     return vx * np.cos(theta) + vy * np.sin(theta), turn
 
 
-@pytest.mark.parametrize(("speed", "turn"), [(0.4, 0.0), (0.0, 1.0), (0.4, 0.5), (0.3, -0.8), (-0.3, 0.2)])
+COMMANDS = [(0.4, 0.0), (0.0, 1.0), (0.4, 0.5), (0.3, -0.8), (-0.3, 0.2)]
+
+
+@pytest.mark.parametrize(("speed", "turn"), COMMANDS)
 def test_the_pioneer_drives_the_commanded_arc(robot, speed, turn):
     """Once up to speed, two seconds are the commanded arc within two per cent and a centimetre."""
     drive(robot, speed, turn, 1.5)
@@ -75,7 +78,7 @@ def test_the_pioneer_respects_its_limits(robot):
 
 
 def test_odometry_is_near_the_truth_but_not_equal(robot):
-    """After a drive the odometry is off by less than five per cent of the way, and not by nothing."""
+    """After a drive the odometry is off by under five per cent of the way, and not by nothing."""
     drive(robot, 0.4, 0.3, 5.0)
     off = np.linalg.norm(robot.odometry[:2] - robot.true_pose[:2])
     assert 1e-4 < off < 0.05 * 2.0
@@ -103,13 +106,16 @@ def background():
     x, y = (np.arange(-0.1, size + 0.1 - 1e-9, 0.05) + 0.025 for size in ROOM)
     x, y = np.meshgrid(x, y)
     parts = [p.bounds for p in BACKGROUND if abs(p.centre[2] - BEAM_HEIGHT) < p.size[2] / 2]
-    blocked = sum((x > a - 0.02) & (x < c + 0.02) & (y > b - 0.02) & (y < d + 0.02) for a, b, c, d in parts) > 0
+    blocked = np.zeros(x.shape, dtype=bool)
+    for a, b, c, d in parts:
+        blocked |= (x > a - 0.02) & (x < c + 0.02) & (y > b - 0.02) & (y < d + 0.02)
     return OccupancyGrid(blocked.astype(float), (-0.1, -0.1), 0.05)
 
 
 @pytest.fixture(scope="module")
 def task():
-    return SimpleNamespace(law=SequencedLDS.fit(figure_eight()), environment=Environment(figure_eight_scene().boxes))
+    environment = Environment(figure_eight_scene().boxes)
+    return SimpleNamespace(law=SequencedLDS.fit(figure_eight()), environment=environment)
 
 
 def run_in_lab(task, background, **keywords):
@@ -119,13 +125,14 @@ def run_in_lab(task, background, **keywords):
 
 
 def pose_errors(run):
-    """Distance in m and angle in degrees between estimate and truth, where the robot believed the estimate."""
+    """Distance in m and angle in degrees from truth to estimate, where that was believed."""
     difference = (run.poses - run.true_poses)[run.localised]
-    return np.hypot(*difference[:, :2].T), np.degrees(np.abs(np.angle(np.exp(1j * difference[:, 2]))))
+    turn = np.angle(np.exp(1j * difference[:, 2]))
+    return np.hypot(*difference[:, :2].T), np.degrees(np.abs(turn))
 
 
 def test_it_performs_on_its_estimated_pose(task, background):
-    """A lap of the figure-eight: finished without contact, localised within 5 cm and 3 degrees on average."""
+    """A lap: finished without contact, localised within 5 cm and 3 degrees on average."""
     run = run_in_lab(task, background)
     assert run.finished and run.collisions == 0, run.reason
     place, turn = pose_errors(run)
@@ -134,7 +141,7 @@ def test_it_performs_on_its_estimated_pose(task, background):
 
 
 def test_kidnapped_it_stops_finds_itself_and_goes_on(task, background):
-    """Carried across the room, it stays where it was put until it knows where that is, and then finishes."""
+    """Carried away, it stays where it was put until it knows where that is, and then finishes."""
     run = run_in_lab(task, background, kidnap=[(6.0, (1.0, 3.5, 2.0))])
     assert run.finished and run.collisions == 0, run.reason
     lost = ~run.localised

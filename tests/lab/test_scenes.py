@@ -42,8 +42,11 @@ def test_box_distance_is_the_distance_to_the_nearest_sampled_point():
     rng = np.random.default_rng(0)
     boxes = np.array([[0.0, 0.0, 1.0, 2.0], [3.0, 1.0, 3.5, 4.0]])
     points = rng.uniform(-1, 5, (50, 2))
-    grid = [np.stack(np.meshgrid(np.linspace(a, c, 200), np.linspace(b, d, 200)), -1) for a, b, c, d in boxes]
-    grid = np.concatenate([part.reshape(-1, 2) for part in grid])
+    grid = []
+    for a, b, c, d in boxes:
+        x, y = np.meshgrid(np.linspace(a, c, 200), np.linspace(b, d, 200))
+        grid.append(np.column_stack([x.ravel(), y.ravel()]))
+    grid = np.concatenate(grid)
     brute = np.linalg.norm(points[:, None] - grid, axis=2).min(axis=1)
     assert np.allclose(box_distance(points, boxes), brute, atol=0.02)
 
@@ -67,7 +70,7 @@ def test_the_room_encloses_all_furniture():
     ],
 )
 def test_a_scene_that_cannot_stand_is_refused(kinds, positions, message):
-    """Unknown kinds, objects too near to anything, outside the room or without position raise ValueError."""
+    """Unknown kinds, objects too near to anything, outside or without position raise ValueError."""
     with pytest.raises(ValueError, match=message):
         Scene(kinds, positions)
 
@@ -75,7 +78,8 @@ def test_a_scene_that_cannot_stand_is_refused(kinds, positions, message):
 def test_moved_and_rearranged_scenes_keep_objects_and_room():
     """Objects elsewhere are as many, and have the room asked for."""
     scene = figure_eight_scene()
-    assert np.allclose(moved(scene, [(0.5, 0.0), (0.0, -0.5)]).positions - scene.positions, [(0.5, 0.0), (0.0, -0.5)])
+    shifts = [(0.5, 0.0), (0.0, -0.5)]
+    assert np.allclose(moved(scene, shifts).positions - scene.positions, shifts)
     for seed in SEEDS:
         other = rearranged(scene, np.random.default_rng(seed))
         assert other.kinds == scene.kinds
@@ -104,7 +108,7 @@ def test_a_figure_eight_goes_round_both_cans_in_the_sense_asked_for(first_turn, 
 
 
 def test_figure_eights_are_about_17_metres_long_and_never_the_same():
-    """A lap's length is near 17.5 m and corresponding points of two laps differ by centimetres, not metres."""
+    """A lap is near 17.5 m long, and points of two laps differ by centimetres, not metres."""
     walk = figure_eight(figure_eight_scene(), 0, laps=5)
     arc = arc_length(walk.positions)
     assert arc[-1] / 5 == pytest.approx(17.5, abs=0.7)
@@ -142,7 +146,8 @@ def test_the_same_seed_walks_the_same_walk():
     """A walk is determined by its seed, and another seed walks differently."""
     scene = figure_eight_scene()
     one, same, other = (figure_eight(scene, seed, laps=1) for seed in (5, 5, 6))
-    assert np.array_equal(one.positions, same.positions) and np.array_equal(one.headings, same.headings)
+    assert np.array_equal(one.positions, same.positions)
+    assert np.array_equal(one.headings, same.headings)
     assert not np.allclose(one.positions[:200], other.positions[:200])
 
 
@@ -189,10 +194,10 @@ def test_walk_at_holds_its_ends():
 def small_recording():
     """Two scans of three beams."""
     ranges = np.array([[1.0, 2.5, np.inf], [1.001, 2.5, 3.0]])
-    log = LaserLog(
-        np.array([0.0, 0.1]), ranges, np.deg2rad([-90.0, 0.0, 90.0]), np.tile([4.5, 0.617, 1.5], (2, 1)), 8.191
-    )
-    truth = pd.DataFrame({"t": [0.0, 0.1], "x": [1.0, 1.1], "y": [2.0, 2.0], "heading": [0.0, 0.25]})
+    t, poses = np.array([0.0, 0.1]), np.tile([4.5, 0.617, 1.5], (2, 1))
+    log = LaserLog(t, ranges, np.deg2rad([-90.0, 0.0, 90.0]), poses, 8.191)
+    way = {"x": [1.0, 1.1], "y": [2.0, 2.0], "heading": [0.0, 0.25]}
+    truth = pd.DataFrame({"t": t, **way})
     return Recording(log, truth, figure_eight_scene())
 
 
@@ -220,7 +225,7 @@ def test_a_recording_reads_back_what_it_wrote(tmp_path, name):
     ],
 )
 def test_damaged_companions_are_named(tmp_path, name, text):
-    """A truth of the wrong length or content and a broken scene raise FormatError with the file's name."""
+    """A truth of wrong length or content and a broken scene raise FormatError and are named."""
     small_recording().save(tmp_path / "eights.log")
     (tmp_path / name).write_text(text)
     with pytest.raises(FormatError, match=name):
