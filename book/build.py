@@ -33,6 +33,7 @@ PAGES = (
     *("README.md", "REPLICATION.md", "CHANGELOG.md", "CONTRIBUTING.md"),
     *("figures/README.md", "data/README.md"),
 )
+PUBLIC = [name for name in dollop.__all__ if name != "__version__"]
 FILE_LINK = re.compile(r'(?:\]\(|src="|href=")([\w./-]+)(?=[)"#])')
 CODE_LINK = re.compile(r"\]\((?P<up>(\.\./)*)(?P<path>dollop/[\w/]+)\.py\)")
 NAME = re.compile(r"`dollop\.(?P<name>(?P<first>\w+)[\w.]*)`")
@@ -124,7 +125,7 @@ def write_api(folder):
         source = f".. automodule:: {name}\n   :members:\n"
         (folder / f"{name}.rst").write_text(heading(name, "=") + source)
     parts = [heading("API", "="), ".. automodule:: dollop\n\n", heading("The public names", "-")]
-    parts.append(table({link_in_rst(name): first_line(name) for name in dollop.__all__}))
+    parts.append(table({link_in_rst(name): first_line(name) for name in PUBLIC}))
     for wing, title in WINGS.items():
         inside = sorted((name for name in sentences if belongs(name) == wing), key=place)
         parts += [heading(title, "-"), *contents(inside, sentences)]
@@ -222,7 +223,7 @@ def link_to_name(found):
     >>> NAME.sub(link_to_name, "`dollop.observe` of `dollop.plot`")
     '{py:obj}`dollop.observe <dollop.observation.observe>` of `dollop.plot`'
     """
-    if found["first"] not in dollop.__all__:
+    if found["first"] not in PUBLIC:
         return found[0]
     return f"{{py:obj}}`dollop.{found['name']} <{home(found['name'])}>`"
 
