@@ -1,6 +1,6 @@
 # make figures   set up .venv from the lock, then regenerate every figure
 # make test      the same set-up, then unit tests, doctests and the notebooks
-.PHONY: help figures test check study bench book data clean
+.PHONY: help figures test fast coverage check study bench book data clean
 .DEFAULT_GOAL := help
 
 # The lock is for Python 3.11: the first of these that really is one.
@@ -13,7 +13,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 help:  ## this list
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 10
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
 
 figures: .venv/ready  ## simulate, observe, learn, perform and draw every figure into figures/
 	$(RUN) -m dollop.figures
@@ -21,6 +21,12 @@ figures: .venv/ready  ## simulate, observe, learn, perform and draw every figure
 test: .venv/ready  ## unit tests, doctests, notebooks
 	$(RUN) -m pytest -n 2 -q
 	env -u MPLBACKEND $(RUN) -m pytest --nbmake --nbmake-timeout=120 -n 2 -q -o addopts="" notebooks
+
+fast: .venv/ready  ## the tests of the library alone, without the replication
+	$(RUN) -m pytest -n 2 -q -m "not replication"
+
+coverage: .venv/ready  ## which lines of the library its tests run
+	$(RUN) -m pytest -n 2 -q -m "not replication" --cov=dollop --cov-report=term
 
 check: .venv/ready  ## lint and formatting
 	$(RUN) -m ruff check .
