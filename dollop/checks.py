@@ -2,7 +2,7 @@
 
 import numpy as np
 
-__all__ = ["FARTHEST", "check_choice", "check_positive", "checked_array", "checked_positions"]
+__all__ = ["check_choice", "check_positive", "checked_array", "checked_positions"]
 
 FARTHEST = 1e9
 """m from the origin: coordinates beyond are no metres, and their squares would overflow."""

@@ -10,7 +10,7 @@ import numpy as np
 import dollop
 from dollop.trajectory import arc_length
 
-__all__ = ["main"]
+__all__ = ["main", "replication"]
 
 LEG_HEIGHT = "at leg height a walker is two small blobs: try --min-area 0.0025 --stride 0.6"
 STOPPED = 130

@@ -16,6 +16,8 @@ import scipy
 
 from dollop.checks import checked_array
 
+__all__ = ["Environment", "corner_indices", "integer_costs", "spring_constants", "spring_forces"]
+
 # A corner's place in its box: 0 lower left, then counter-clockwise. The columns are those of a box (x, y).
 _CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
 # The ceiling would make 1 of a rounding error of 1e-13: changes of force below this many units count as none.

@@ -12,6 +12,18 @@ import scipy
 from dollop.checks import check_positive
 from dollop.gridmap import in_metres
 
+__all__ = [
+    "Blobs",
+    "ForegroundGrid",
+    "bounding_boxes",
+    "endpoints",
+    "find_blobs",
+    "foreground_mask",
+    "near_together",
+    "seen_free",
+    "surface_points",
+]
+
 EIGHT_CONNECTED = np.ones((3, 3), dtype=bool)
 
 

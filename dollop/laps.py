@@ -8,6 +8,8 @@ import numpy as np
 
 from dollop.trajectory import arc_length, check_trajectory, resample
 
+__all__ = ["laps"]
+
 REPEATS = 1 / 3  # a track repeats itself if a lap later it is this much closer to itself than two random places are
 LAP_SPREAD = 0.15  # share by which one lap may be shorter or longer than the typical one
 BESIDE = 0.05  # a track is on its laps once it has run this share of a lap within a gate's width of the next lap

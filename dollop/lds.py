@@ -14,6 +14,8 @@ import numpy as np
 from dollop.pose import rotation
 from dollop.trajectory import check_trajectories, retime
 
+__all__ = ["DECAY", "LDS", "NOTHING", "STEPS", "Statistics", "dot", "powers_on"]
+
 SHRINKAGE = 1e-3  # share of the mean variance that is added to every direction of G0
 STEPS, DECAY = 40, 3.0  # a re-timed segment: its steps, and the time constants over which it decays
 NOTHING = 1e-18  # m^2, a squared length that counts as zero

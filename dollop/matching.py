@@ -29,6 +29,8 @@ import scipy
 from dollop.checks import check_choice, check_positive
 from dollop.environment import corner_indices, integer_costs
 
+__all__ = ["Matching", "match", "match_confidently", "second_best"]
+
 _KAPPA = 1.0  # of a layout that was turned, small turns are a little likelier
 _TURNED = 4.0  # L_turn, nats
 _SHIFTED = 6.0  # L_shift, nats

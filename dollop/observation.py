@@ -17,6 +17,8 @@ from dollop.foreground import (
 from dollop.gridmap import flat_cells
 from dollop.tracking import Track, Tracker, identify_user, track_objects, user_track
 
+__all__ = ["STATIC_EVERY", "Observation", "foreground_hits", "observe", "static_boxes"]
+
 STATIC_EVERY = 5
 """The slow grid looks at every fifth scan: what is static is still there then."""
 

@@ -12,6 +12,8 @@ import numpy as np
 from dollop.lds import DECAY, NOTHING, STEPS, Statistics, dot, powers_on
 from dollop.trajectory import remaining_share
 
+__all__ = ["best_segments", "fewest_segments", "raw_statistics", "retimed_statistics", "segment_errors"]
+
 HORIZON, SETTLED = 48, 4.0  # the search follows a response over this many points, this many time constants
 EVEN = 1e-8  # m per squared cut: among equal errors the more even division, not what rounding prefers
 

@@ -8,6 +8,8 @@ from dollop.lds import LDS
 from dollop.segmentation import best_segments, fewest_segments, raw_statistics, retimed_statistics, segment_errors
 from dollop.trajectory import align, arc_length, check_trajectories, check_trajectory, distance_to_polyline, resample
 
+__all__ = ["SequencedLDS"]
+
 LEAST_REACH = 1e-6  # m: nearer to a subgoal than what coordinates can tell, a response would never arrive
 MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
 

@@ -17,6 +17,8 @@ from dollop.matching import Matching, match_confidently
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import check_trajectories
 
+__all__ = ["Demonstration", "Task", "anchors", "learn", "members_along"]
+
 FORMAT, VERSION = "dollop task", 1
 
 

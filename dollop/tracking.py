@@ -16,6 +16,25 @@ import scipy
 
 from dollop.checks import check_choice, check_positive
 
+__all__ = [
+    "MATCHERS",
+    "Motion",
+    "Track",
+    "Tracker",
+    "draw_particles",
+    "identify_user",
+    "kalman_filter",
+    "match_greedily",
+    "match_jointly",
+    "move_particles",
+    "particle_moments",
+    "predict",
+    "smooth",
+    "track_objects",
+    "update",
+    "user_track",
+]
+
 
 @dataclass(frozen=True, eq=False)
 class Track:

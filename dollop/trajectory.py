@@ -7,6 +7,19 @@ import numpy as np
 
 from dollop.checks import checked_positions
 
+__all__ = [
+    "align",
+    "arc_length",
+    "at_arc_length",
+    "check_trajectories",
+    "check_trajectory",
+    "distance_to_polyline",
+    "mean_trajectory",
+    "remaining_share",
+    "resample",
+    "retime",
+]
+
 ROUNDS = 3  # how often walks are laid onto their mean: then it hardly changes any more
 
 

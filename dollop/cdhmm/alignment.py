@@ -27,6 +27,18 @@ from dollop.cdhmm.evidence import (
 )
 from dollop.cdhmm.merging import merge_states, topological_order
 
+__all__ = [
+    "LEAST_COVERAGE",
+    "align_chain",
+    "coverage_of",
+    "earliest",
+    "estimate_structure",
+    "mean_place",
+    "numbered",
+    "path_through",
+    "set_apart",
+]
+
 LEAST_COVERAGE = 0.5  # of the states on the most-likely path: who visits fewer does something else
 
 

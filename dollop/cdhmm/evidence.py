@@ -20,6 +20,23 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+__all__ = [
+    "END",
+    "FIRST",
+    "LEAST_GAIN",
+    "START",
+    "Graph",
+    "chains_of",
+    "emission_evidence",
+    "emission_table",
+    "evidence_of",
+    "graph_of",
+    "outer_products",
+    "prior_over",
+    "steps_of",
+    "transition_evidence",
+]
+
 START, END, FIRST = 0, 1, 2  # nodes of every graph: the start, the end, then the states
 LEAST_GAIN = 1e-9  # nats: a smaller gain of evidence is rounding, not a reason
 

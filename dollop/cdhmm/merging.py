@@ -11,6 +11,8 @@ import scipy
 
 from dollop.cdhmm.evidence import FIRST, LEAST_GAIN, emission_evidence, emission_table, graph_of
 
+__all__ = ["merge_states", "topological_order"]
+
 
 class Merging:
     """The gain of evidence of every pair of nodes, kept up to date while pairs are merged.

@@ -42,6 +42,8 @@ from dollop.cdhmm.evidence import (
 )
 from dollop.checks import check_positive, checked_positions
 
+__all__ = ["SubgoalHMM"]
+
 LEAST_SPREAD, MOST_SPREAD = 1e-6, 1e6  # m: beyond, the evidence drowns in rounding
 
 

@@ -21,6 +21,8 @@ from dollop.formats.files import FormatError, forgive, longest_rise, read_bytes,
 from dollop.laser import LaserLog
 from dollop.pose import wrapped
 
+__all__ = ["Odometry", "flaser_angles", "read_log", "read_odometry", "write_log"]
+
 NOMINAL_MAX_RANGE = 80.0
 """What CARMEN takes for the maximum range of a laser in a FLASER line, in m (`readlog.c`)."""
 

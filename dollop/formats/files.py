@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+__all__ = ["FormatError", "check_writable", "forgive", "longest_rise", "read_bytes", "usable_clock", "whole_file"]
+
 MAX_BYTES = 1 << 30
 NOMINAL_RATE = 10.0
 """Scans per second of a SICK LMS 200 at 1 degree and 38400 baud: what a log without a usable clock

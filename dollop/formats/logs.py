@@ -5,6 +5,8 @@ from pathlib import Path
 from dollop.formats import carmen_log
 from dollop.formats.files import FormatError
 
+__all__ = ["read_log", "write_log"]
+
 CARMEN_SUFFIXES = (".log", ".log.gz", ".clf", ".clf.gz")
 ROS_SUFFIXES = (".bag", ".mcap", ".db3")
 

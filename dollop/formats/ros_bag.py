@@ -9,6 +9,8 @@ import numpy as np
 from dollop.formats.files import FormatError, forgive, usable_clock
 from dollop.laser import LaserLog
 
+__all__ = ["read_log"]
+
 SCAN_TYPE = "sensor_msgs/msg/LaserScan"
 MOTION_TYPE = "nav_msgs/msg/Odometry"
 

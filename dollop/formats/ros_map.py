@@ -14,6 +14,8 @@ from PIL import Image
 from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, read_bytes, whole_file
 
+__all__ = ["read_map", "write_map"]
+
 UNKNOWN_GREY = (127, 128)
 """Written maps have thresholds that make these two greys, and no other, the unknown."""
 

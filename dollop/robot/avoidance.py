@@ -22,6 +22,8 @@ import scipy
 
 from dollop.gridmap import covered_cells, in_cells, in_metres
 
+__all__ = ["FREE_BELOW", "Geodesic", "ObstacleMap"]
+
 ROBOT_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
 KEPT, INFLUENCE = 0.20, 0.50

@@ -26,6 +26,8 @@ import scipy
 from dollop.pose import wrapped
 from dollop.robot.avoidance import Geodesic
 
+__all__ = ["CONTROL_LAWS", "PIONEER_LIMITS", "REACH", "Guidance", "Limits", "clip"]
+
 REACH = 0.25
 """How near to its subgoal a segment hands over, in m: a robot that needs 0.6 m to turn would circle
 nearer ones.

@@ -27,6 +27,8 @@ from dollop.gridmap import covered_cells, in_cells
 from dollop.pose import rotation
 from dollop.robot.avoidance import FREE_BELOW
 
+__all__ = ["MonteCarloLocalizer"]
+
 SIGMA, WIDE_SIGMA = 0.10, 0.20
 """Standard deviation in m of the likelihood field: for particles, and for a lattice, which misses
 the true pose.

@@ -17,6 +17,8 @@ from dollop.robot.avoidance import Geodesic, ObstacleMap
 from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits, clip
 from dollop.trajectory import distance_to_polyline
 
+__all__ = ["Run", "Unicycle", "distances_to_law", "free_poses", "perform", "return_times"]
+
 SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
 """A robot that does not know where it is turns on the spot, rad/s, and moves off what it touches,
 m/s: back, and if that has not helped within so many s, forth."""
