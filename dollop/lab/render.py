@@ -14,6 +14,7 @@ from matplotlib.image import imsave
 from dollop.lab.pioneer import Pioneer
 from dollop.lab.scenes import FURNITURE, KINDS, ROOM, WHITE, Part, figure_eight_scene
 from dollop.lab.world import Server, body_offsets
+from dollop.pose import rotation
 
 __all__ = ["render_lab", "render_robot"]
 
@@ -247,8 +248,8 @@ LOOKS = {"trash can": show_can, "cone": show_cone}
 
 def show_person(studio, position, heading, phase):
     """A person in mid-step, for the eye only: the laser meets the simpler body of `World`."""
-    cos, sin = np.cos(heading), np.sin(heading)
-    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    turn = np.eye(3)
+    turn[:2, :2] = rotation(heading)
     facing = (0.0, 0.0, np.sin(heading / 2), np.cos(heading / 2))
 
     def put(offset, profile, colour, squash=1.0):

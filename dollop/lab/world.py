@@ -5,6 +5,7 @@ import pybullet
 
 from dollop.lab.person import DEPTH, SHOULDERS, STRIDE_RATE
 from dollop.lab.scenes import BACKGROUND, BEAM_HEIGHT, KINDS
+from dollop.pose import rotation
 
 __all__ = ["PHYSICS_RATE", "Server", "World", "body_offsets"]
 
@@ -113,10 +114,9 @@ class World(Server):
         phase : float
             Phase of the gait in rad.
         """
-        turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
         upright = (0.0, 0.0, np.sin(heading / 2), np.cos(heading / 2))
         for body, offset in zip(self.person, body_offsets(self.legs, phase), strict=True):
-            x, y = position + turn @ offset
+            x, y = position + rotation(heading) @ offset
             self.call("resetBasePositionAndOrientation", body, (x, y, BEAM_HEIGHT), upright)
 
     def remove_person(self):
