@@ -10,8 +10,9 @@ from dollop.gridmap import OccupancyGrid
 from dollop.laps import laps
 from dollop.matching import match
 from dollop.observation import observe
+from dollop.replication.runs import free_poses
 from dollop.robot.avoidance import ObstacleMap
-from dollop.robot.performing import free_poses, perform
+from dollop.robot.performing import perform
 from dollop.task import Demonstration, Task, learn
 from dollop.trajectory import arc_length, at_arc_length
 

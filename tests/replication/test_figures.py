@@ -11,7 +11,7 @@ from places import ROOT
 from dollop.replication import baseline, figures, recordings
 from dollop.replication.figures.runs import CONTROLS, numbers
 from dollop.replication.layouts import matching_shares
-from dollop.robot.performing import distances_to_law
+from dollop.replication.runs import distances_to_law
 
 COMMITTED = json.loads((ROOT / "figures" / "metrics.json").read_text())
 

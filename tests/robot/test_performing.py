@@ -9,9 +9,10 @@ from rooms import CANS, figure_eight_task, room_map
 
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
+from dollop.replication.runs import distances_to_law, free_poses
 from dollop.robot.avoidance import INFLUENCE, ObstacleMap
 from dollop.robot.control import PIONEER_LIMITS, Limits
-from dollop.robot.performing import Search, Unicycle, distances_to_law, free_poses, perform, return_times
+from dollop.robot.performing import Search, Unicycle, perform
 from dollop.trajectory import distance_to_polyline
 
 START = (4.5, 3.6, -0.7)
@@ -255,37 +256,6 @@ def test_a_pose_that_is_lost_ends_the_run(task):
     assert run.t[-1] == pytest.approx(2.0)
 
 
-def test_return_times(task):
-    """The time until the robot keeps to its response again: none where it would be anyway, some beside it."""
-    undisturbed = perform(task, Unicycle(START))
-    runs = [perform(task, Unicycle(START), kidnap=[(8.0, p)]) for p in (undisturbed.poses[80], (4.5, 5.8, 0.0))]
-    assert return_times(runs[0], task.law) == pytest.approx([0.0], abs=1e-9)
-    assert 0.5 < return_times(runs[1], task.law)[0] < 20
-    assert runs[0].kidnapped == pytest.approx([8.0])
-
-
-def test_return_times_by_hand(task):
-    """Back after 1 s; kidnapped again before; back after 2 s, a touch of half a second not counting; ended before."""
-    response, t = task.law.response(), np.arange(110) / 10
-    across = (response[41] - response[39]) @ [[0, 1], [-1, 0]]
-    beside = response[40] + 0.15 * across / np.hypot(*across)
-    places = np.tile(response[40], (110, 1))
-    places[0] = task.law.start
-    places[(t >= 2) & (t < 3) | (t >= 4) & (t < 6) | (t >= 10) & (t < 10.5)] += [0.0, 5.0]
-    places[(t >= 6) & (t < 7) | (t >= 7.5) & (t < 8)] = beside
-    run = SimpleNamespace(true_poses=np.c_[places, 0 * t], t=t, kidnapped=np.array([2.0, 4.0, 6.0, 10.0]))
-    np.testing.assert_allclose(return_times(run, task.law), [1.0, np.inf, 2.0, np.inf])
-
-
-def test_crossing_the_response_is_not_coming_back(task):
-    """A robot put on a part of the response that it is not heading along leaves it at once, and is not back yet."""
-    response = task.law.response(START[:2])
-    run = perform(task, Unicycle(START), kidnap=[(8.0, (*response[len(response) // 2], 0.0))])
-    (time,) = return_times(run, task.law)
-    assert distances_to_law(run, task.law)[80] < 0.01
-    assert 2 < time < 20
-
-
 def test_only_kidnappings_that_happened_are_told(task):
     """A kidnapping after the end of the run is none."""
     run = perform(task, Unicycle(START), kidnap=[(8.0, (4.5, 5.8, 0.0)), (1e9, (4.5, 5.8, 0.0))])
@@ -341,17 +311,6 @@ def test_a_lost_robot_tries_the_other_way():
     assert pressed[:18] == [-0.1] * 18 and pressed[22:38] == [0.1] * 16
     freed = [search.command(False) for _ in range(12)]
     assert [v for v, _ in freed[:10]] == [pressed[-1]] * 10 and freed[-1] == (0.0, 0.5)
-
-
-def test_free_poses_are_free_and_everywhere(task, background):
-    """Poses have the room asked for, in every corner of the map that can be reached, and head anywhere."""
-    obstacles = ObstacleMap.of(task.environment, background)
-    poses = free_poses(300, obstacles, task.law.subgoals[0], seed=0, room=0.3)
-    assert obstacles.edges(poses[:, :2]).min() > 0.3 - 1e-6
-    assert np.histogram(poses[:, 2], 4, (-np.pi, np.pi))[0].min() > 40
-    assert np.ptp(poses[:, 0]) > 6.5 and np.ptp(poses[:, 1]) > 4.5
-    divided = ObstacleMap.of(Environment([[5.4, 0.0, 5.6, 7.0]]), background)
-    assert free_poses(50, divided, (2.0, 2.0), seed=0)[:, 0].max() < 5.4
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,10 @@ import numpy as np
 from dollop.environment import Environment
 from dollop.lds import LDS
 from dollop.replication import recordings
+from dollop.replication.runs import distances_to_law, free_poses, return_times
 from dollop.robot.avoidance import ObstacleMap
 from dollop.robot.control import Guidance
-from dollop.robot.performing import Unicycle, distances_to_law, free_poses, perform, return_times
+from dollop.robot.performing import Unicycle, perform
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory, resample
 

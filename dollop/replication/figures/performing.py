@@ -8,7 +8,7 @@ from dollop.pose import wrapped
 from dollop.replication import recordings
 from dollop.replication.figures.panel import panel
 from dollop.replication.figures.runs import COLUMNS, CONTROLS, draw_runs, numbers, runs_by_kind
-from dollop.robot.performing import distances_to_law, return_times
+from dollop.replication.runs import distances_to_law, return_times
 from dollop.trajectory import mean_trajectory
 
 __all__ = ["law_numbers"]
@@ -26,10 +26,10 @@ def figure_6b():
     some subgoals it has a corner: each segment is fitted without regard to the next, and its
     response arrives along the direction in which it is slowest. The paper: 6 LDS, 20 mm on average.
     """
-    recording, observation = recordings.figure_eights(), recordings.figure_eights_observed()
-    law, laps = recordings.figure_eight_task().law, recordings.figure_eight_laps()
+    robot, task = recordings.figure_eights().log.poses[0], recordings.figure_eight_task()
+    law, laps = task.law, recordings.figure_eight_laps()
     figure, ax = plt.subplots(figsize=SIZE)
-    plot.workspace(recordings.background_map(), recording.log.poses[0], observation.environment.boxes, ax)
+    plot.workspace(recordings.background_map(), robot, task.environment.boxes, ax)
     for k, lap in enumerate(laps):
         plot.path(ax, lap, "laps" if k == 0 else None, linewidth=0.4, alpha=0.6)
     plot.law(ax, law.response())
@@ -63,11 +63,11 @@ def law_numbers(law, walks):
 def figure_7a():
     """Ten runs of Agent Orange performing the estimated trajectory of Figure 6b.
 
-    Left the paper's kind of control, which points along the response and knows nothing of wheels, so
-    that the robot swings wide in the curves; right Dollop's own, which respects the robot's dynamics
-    and would go round obstacles, but here it meets none. The fan is the starts, each a little off.
-    Distances are from the robot to the response from where that run started, not to the green line,
-    which starts where the laps do.
+    Left the paper's kind of control, which points along the response and knows nothing of wheels,
+    so that the robot swings wide in the curves; right Dollop's own, which respects the robot's
+    dynamics and would go round obstacles, but here it meets none. The fan is the starts, each a
+    little off. Distances are from the robot to the response from where that run started, not to the
+    green line, which starts where the laps do.
     """
     figure, runs_of = draw_both(recordings.eight_runs)
     return figure, numbers(runs_of, how_near)
@@ -84,7 +84,7 @@ def draw_both(work):
 
 
 def how_near(runs):
-    """How far the runs of the figure-eight are from the response, and their estimated poses from the true ones."""
+    """How far the runs are from the response, and their estimated poses from the true ones."""
     law = recordings.figure_eight_task().law
     distances = np.concatenate([distances_to_law(run, law) for run in runs])
     places, turns = np.transpose([pose_errors(run) for run in runs])
@@ -107,12 +107,12 @@ def figure_7b():
     """The response of Agent Orange after being kidnapped.
 
     Five runs, a shade and dashes each. A dotted line leads to where the robot was carried, and the
-    number there is the run's, the same left and right. Left the paper's kind of control: it heads for
-    the active subgoal through whatever is in the way, and the circle is the robot where that first
-    ends in a contact; that the paper's robot hit nothing was, as it says, a coincidence. Right
-    Dollop's own, which goes round obstacles. One run may touch an obstacle several times, so contacts
-    and runs with a contact are counted apart. Time to return: until the robot is within ten
-    centimetres of the response from its start and stays there for a second.
+    number there is the run's, the same left and right. Left the paper's kind of control: it heads
+    for the active subgoal through whatever is in the way, and the circle is the robot where that
+    first ends in a contact; that the paper's robot hit nothing was, as it says, a coincidence.
+    Right Dollop's own, which goes round obstacles. One run may touch an obstacle several times, so
+    contacts and runs with a contact are counted apart. Time to return: until the robot is within
+    ten centimetres of the response from its start and stays there for a second.
     """
     figure, runs_of = draw_both(recordings.kidnapped_runs)
     return figure, numbers(runs_of, how_soon)
