@@ -49,7 +49,7 @@ html_theme_options = {
 }
 html_math_renderer = "mathml"
 
-SHORT = {"function", "class", "exception"}
+SHORT = {"function", "class", "exception", "data"}
 MEMBERS = {"method", "classmethod", "staticmethod", "property", "attribute"}
 
 
@@ -70,7 +70,7 @@ def plain_text_first(app, what, name, thing, options, lines):
     for n, line in enumerate(lines):
         prose = line if line[:1] in ("", " ", ">", "=") else line.replace("|", r"\|")
         lines[n] = re.sub(r"(?<!`)`(\.[^`]+)`(?!`)", r"``\1``", prose)
-    if what == "property":
+    if what in ("property", "attribute", "data"):
         lines.insert(0, "")  # or napoleon takes what stands before a colon for a type
 
 
