@@ -47,7 +47,7 @@ BEGIN, END = "<!-- claims: begin -->", "<!-- claims: end -->"
 
 
 def work(seed, ids, claims=CLAIMS):
-    """Every experiment of some claims for one seed; one experiment may serve several claims.
+    """The experiments of some claims for one seed.
 
     Parameters
     ----------
@@ -65,17 +65,15 @@ def work(seed, ids, claims=CLAIMS):
     failures : list of str
         What went wrong, by claim; the others go on.
     """
-    found, rows, failures = {}, [], []
+    rows, failures = [], []
     for id in ids:
-        claim = claims[id]
         try:
-            if claim.experiment not in found:
-                found[claim.experiment] = claim.experiment(seed)
+            found = claims[id].experiment(seed)
         except Exception as error:  # whatever it is, the other claims' results are not lost
             failures.append(f"claim {id}, seed {seed}: {type(error).__name__}: {error}")
             continue
-        numbers = found[claim.experiment]
-        rows += [(id, seed, each.number, float(f"{numbers[each.number]:.6g}")) for each in claim.criteria]
+        numbers = [each.number for each in claims[id].criteria]
+        rows += [(id, seed, number, float(f"{found[number]:.6g}")) for number in numbers]
     return seed, rows, failures
 
 
@@ -234,7 +232,7 @@ def summary(claim, rows):
         "id": claim.id,
         "section": claim.section,
         "quote": claim.quote,
-        "experiment": claim.setup,
+        "experiment": " ".join(claim.experiment.__doc__.split()),
         "seeds": int(rows.seed.nunique()),
         "numbers": numbers,
         "verdict": verdict([each["met"] for each in numbers if each["met"]]),

@@ -11,17 +11,13 @@ import pytest
 from dollop.cli import main
 from dollop.formats.files import FormatError
 from dollop.replication import study
-from dollop.replication.claims import Claim, Criterion
-from dollop.replication.claims import environment as trials_environment
-from dollop.replication.claims import learning as trials_learning
-from dollop.replication.claims import observing as trials_observing
-from dollop.replication.claims import performing as trials_performing
+from dollop.replication.claims import Claim, Criterion, environment, law, learning, measures, observing, robot
 
 
 def claim_of(experiment):
     """A claim that wants a positive number of an experiment."""
     criterion = Criterion("number", "a number", (0, np.inf))
-    return Claim("fake", "I", "words", experiment, (criterion,), "nothing")
+    return Claim("fake", "I", "words", (criterion,), experiment)
 
 
 def counting(folder):
@@ -160,13 +156,6 @@ def test_a_dask_worker_that_dies_for_good_ends_the_study(tmp_path, runs, monkeyp
     assert "a worker died" in capsys.readouterr().err
 
 
-def test_one_experiment_serves_its_claims_once(runs):
-    """Two claims of one experiment share its result."""
-    fake = counting(runs)["fake"]
-    _, rows, failures = study.work(7, ["a", "b"], {"a": fake, "b": replace(fake, id="b")})
-    assert [row[0] for row in rows] == ["a", "b"] and not failures and len(list(runs.iterdir())) == 1
-
-
 def test_the_command_writes_table_and_claims(tmp_path, capsys):
     """From the command line to results.csv and claims.json; a second call adds nothing."""
     arguments = ["study", "combined", "--seeds", "4", "--folder", str(tmp_path / "s")]
@@ -269,8 +258,8 @@ def test_windings_count_turns():
     """Twice round counter-clockwise is +2, a point outside is 0, and clockwise is negative."""
     turn = np.linspace(0, 4 * np.pi, 100, endpoint=False)
     path = np.column_stack([np.cos(turn), np.sin(turn)])
-    assert trials_performing.windings(path, [[0.2, 0.1], [3, 0]]).tolist() == [2, 0]
-    assert trials_performing.windings(path[::-1], [[0.2, 0.1]]).tolist() == [-2]
+    assert measures.windings(path, [[0.2, 0.1], [3, 0]]).tolist() == [2, 0]
+    assert measures.windings(path[::-1], [[0.2, 0.1]]).tolist() == [-2]
 
 
 def test_predictions_of_a_straight_walk_are_right():
@@ -279,11 +268,10 @@ def test_predictions_of_a_straight_walk_are_right():
     truth = np.column_stack([1.0 * t, 0.5 * t])
     shown = truth.copy()
     shown[40:55] = np.nan
-    for motion in (trials_observing.VELOCITY, trials_observing.ACCELERATION):
-        assert np.abs(trials_observing.causal_states(t, shown, motion)[:, 0] - truth)[40:55].max() < 0.05
-    standing = trials_observing.causal_states(t, shown, trials_observing.VELOCITY, trials_observing.standing_still)[
-        :, 0
-    ]
+    for motion in map(observing.motion, ("velocity", "acceleration")):
+        assert np.abs(observing.causal_states(t, shown, motion)[:, 0] - truth)[40:55].max() < 0.05
+    motion = observing.motion("velocity")
+    standing = observing.causal_states(t, shown, motion, observing.standing_still)[:, 0]
     assert np.allclose(standing[40:55], standing[40])
 
 
@@ -292,7 +280,7 @@ def test_hiding_takes_away_one_second_in_four():
     t, places = np.arange(0, 20, 0.1), np.ones((200, 2))
     occluded = t < 5
     user = type("Track", (), {"t": t, "measurements": places, "occluded": occluded})
-    shown, hidden = trials_observing.now_and_then(user)
+    shown, hidden = observing.now_and_then(user)
     assert np.isnan(shown[hidden]).all() and not (hidden & occluded).any()
     assert 30 <= hidden.sum() <= 42
 
@@ -303,14 +291,14 @@ def test_walkers_far_apart_are_never_switched(matching):
     t = np.arange(0, 6.05, 0.1)
     objects = [np.array([[x, 0.0], [x, 4.0]]) for x in t]
     alone = np.tile([0, 1], (len(t), 1))
-    assert trials_observing.switches(t, objects, alone, matching) == 0
+    assert observing.switches(t, objects, alone, matching) == 0
     alone[30:] = [1, 0]
-    assert trials_observing.switches(t, objects, alone, matching) == pytest.approx(10.0)
+    assert observing.switches(t, objects, alone, matching) == pytest.approx(10.0)
 
 
 def test_walkers_that_coincide_are_one_centroid():
     """There are as many centroids as groups, and a walker alone has the index of its own."""
-    t, objects, alone = trials_observing.crossing_walkers(12, np.random.default_rng(3))
+    t, objects, alone = observing.crossing_walkers(12, np.random.default_rng(3))
     assert len(t) == len(objects) == len(alone)
     assert any(len(each) < 12 for each in objects)
     for centroids, names in zip(objects, alone, strict=True):
@@ -324,62 +312,62 @@ def test_the_user_is_who_is_nearest_to_the_expected_place():
     straight = np.column_stack([t, np.zeros_like(t)])
     tracks = [type("Track", (), {"t": t, "positions": straight + [0, off]}) for off in (0.1, 2.0)]
     users = np.where(t < 1, 0, 1)
-    assert trials_observing.named_right(users, tracks, t, straight).tolist() == (t < 1).tolist()
+    assert observing.named_right(users, tracks, t, straight).tolist() == (t < 1).tolist()
 
 
 def test_a_bend_is_the_distance_from_the_chord():
     """Half a circle of 1 m bends by 1 m, a straight line not at all."""
     turn = np.linspace(0, np.pi, 101)
-    assert trials_observing.bend(np.column_stack([np.cos(turn), np.sin(turn)])) == pytest.approx(1.0)
-    assert trials_observing.bend(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])) == pytest.approx(0.0)
-    spans = trials_observing.spans_of(np.array([0, 1, 1, 0, 1], bool))
+    assert observing.bend(np.column_stack([np.cos(turn), np.sin(turn)])) == pytest.approx(1.0)
+    assert observing.bend(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])) == pytest.approx(0.0)
+    spans = observing.spans_of(np.array([0, 1, 1, 0, 1], bool))
     assert [rows.tolist() for rows in spans] == [[1, 2], [4]]
 
 
 def test_speeds_are_told_by_shares_of_the_way():
     """A walk at 0.5 m/s and then at 1 m/s is at 0.5 m/s in the first half of its way."""
     x = np.concatenate([np.arange(0, 5, 0.05), np.arange(5, 10, 0.1)])
-    speeds = trials_performing.speeds_along(np.column_stack([x, np.zeros_like(x)]))
+    speeds = law.speeds_along(np.column_stack([x, np.zeros_like(x)]))
     assert np.allclose(speeds[5:90], 0.5) and np.allclose(speeds[110:-5], 1.0)
 
 
 def test_a_run_counts_until_its_first_collision():
     """Who is back only after having hit something does not count as back."""
     run = type("Run", (), {"t": np.arange(5) * 0.1, "clearance": np.array([1, 1, -0.1, 1, 1]), "collisions": 1})
-    assert trials_performing.first_hit(run) == pytest.approx(0.2)
+    assert robot.first_hit(run) == pytest.approx(0.2)
     run.collisions = 0
-    assert trials_performing.first_hit(run) == np.inf
+    assert robot.first_hit(run) == np.inf
 
 
 def test_one_transformation_is_found_again():
     """A turn, a factor and a shift of points are found; without a turn, what is nearest."""
     points = np.array([[0.0, 0.0], [4.0, 0.0], [1.0, 2.0]])
     moved = points @ np.array([[0.0, 2.0], [-2.0, 0.0]]) + [1.0, 3.0]
-    factor, shift = trials_environment.similarity(points, moved)
+    factor, shift = environment.similarity(points, moved)
     assert factor == pytest.approx(2j) and shift == pytest.approx(1 + 3j)
-    factor, shift = trials_environment.scaling(points, 2 * points + [1.0, 3.0])
+    factor, shift = environment.similarity(points, 2 * points + [1.0, 3.0], turning=False)
     assert factor == pytest.approx(2) and shift == pytest.approx(1 + 3j)
 
 
 def test_the_linear_program_finds_the_best_bijection():
     """On random costs it costs what the best of all bijections does, and its shares are whole."""
     costs = np.random.default_rng(5).integers(0, 1000, (6, 6))
-    found = trials_environment.assignment_program(costs)
-    assert found.fun == pytest.approx(costs[np.arange(6), trials_environment.bijections(6)].sum(axis=1).min())
+    found = environment.assignment_program(costs)
+    assert found.fun == pytest.approx(costs[np.arange(6), environment.bijections(6)].sum(axis=1).min())
     assert np.allclose(found.x, found.x.round())
 
 
 def test_heavy_tails_have_the_told_scale():
     """Half of the subgoals' errors are within 0.765 scales, as Student's t of three degrees of freedom has it."""
     truth = np.zeros((6, 2))
-    off = np.concatenate([each[:6] for each in trials_learning.drawn_with_tails(truth, 2000, 1) if len(each) == 6])
-    assert np.median(np.abs(off)) == pytest.approx(0.765 * trials_learning.SPREAD, rel=0.03)
+    off = np.concatenate([each[:6] for each in learning.drawn_with_tails(truth, 2000, 1) if len(each) == 6])
+    assert np.median(np.abs(off)) == pytest.approx(0.765 * learning.SPREAD, rel=0.03)
 
 
 def test_passing_places_are_in_turn_left_and_right():
     """Of a row along x they lie 0.75 m above and below."""
     cones = np.array([[0.0, 0.0], [1.5, 0.0], [3.0, 0.0]])
-    assert trials_learning.intended_places(cones)[:, 1].tolist() == [0.75, -0.75, 0.75]
+    assert learning.intended_places(cones)[:, 1].tolist() == [0.75, -0.75, 0.75]
 
 
 def test_golden_numbers_are_those_of_one_seed():

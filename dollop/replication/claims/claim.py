@@ -1,0 +1,100 @@
+"""What a claim of the paper is, and how one is registered beside its experiment.
+
+A claim has one criterion or more: the mean of a number over the seeds, and the range in which the
+claim wants it; some numbers have none and are only told. A criterion is met when the whole 95 %
+interval lies within its range, and clearly not met when it lies wholly beside it. A claim holds if
+all its criteria are met; it does not hold if none is and one clearly is not; otherwise it holds in
+part.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+
+__all__ = ["MORE", "MOSTLY", "NONE", "REGISTRY", "Claim", "Criterion", "claim"]
+
+MORE, MOSTLY, NONE = (0.0, inf), (0.9, 1), (-inf, 1e-6)
+"""What many claims want: more than something else, nine times of ten, nothing but rounding."""
+
+REGISTRY = {}
+"""Every claim by its id, file by file; `dollop.replication.claims.CLAIMS` is in order."""
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """What a claim says of one number.
+
+    Parameters
+    ----------
+    number : str
+        Key of the experiment's result.
+    meaning : str
+        What it is, with its unit.
+    wanted : (float, float), optional
+        The claim wants the mean over the seeds in here, the upper end included; without it the
+        number is only told.
+    trials : int
+        The number of a seed is the share of so many trials, 0 if it is no share. The interval of a
+        share of one trial is Wilson's.
+    timed : bool
+        Whether it is a time that something took, which no two runs have in common.
+    """
+
+    number: str
+    meaning: str
+    wanted: tuple | None = None
+    trials: int = 0
+    timed: bool = False
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of the paper that an experiment can test.
+
+    Parameters
+    ----------
+    id : str
+        A word that names it.
+    section : str
+        Of the paper.
+    quote : str
+        Its words.
+    criteria : tuple of Criterion
+        At least one with a wanted range.
+    experiment : callable
+        seed -> dict of numbers; nan where the seed gives none. Its docstring says what is measured,
+        on what.
+    constructed : bool
+        Whether the method as reconstructed makes it true or false whatever the data: then the
+        experiment checks the program, and says nothing of the world.
+    """
+
+    id: str
+    section: str
+    quote: str
+    criteria: tuple
+    experiment: Callable
+    constructed: bool = False
+
+
+def claim(section, quote, *criteria, constructed=False):
+    """Register the decorated experiment as that of a claim, which has its name.
+
+    Parameters
+    ----------
+    section, quote, criteria, constructed
+        As `Claim` has them.
+
+    Returns
+    -------
+    callable
+        Decorator that leaves the experiment as it is. An underscore behind a name that is Python's
+        own, `filter_`, is no part of the claim's.
+    """
+
+    def register(experiment):
+        id = experiment.__name__.rstrip("_")
+        REGISTRY[id] = Claim(id, section, quote, criteria, experiment, constructed)
+        return experiment
+
+    return register

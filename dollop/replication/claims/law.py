@@ -1,0 +1,184 @@
+"""Claims on the control law (Sec. III)."""
+
+from math import inf
+
+import numpy as np
+
+from dollop.lds import LDS
+from dollop.pose import wrapped
+from dollop.replication import recordings
+from dollop.replication.claims.claim import MORE, MOSTLY, Criterion, claim
+from dollop.replication.claims.measures import SHARES, clear_of, headings, is_eight, segments_along
+from dollop.sequenced_lds import SequencedLDS
+from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory, resample
+
+__all__ = []
+
+
+@claim(
+    "III",
+    "To reduce the number of parameters used to describe a demonstration, Dollop represents "
+    "trajectories by a sequence of linear dynamical systems [9].",
+    Criterion("share_of_lap", "numbers in the law, share of those in one lap", (-inf, 1)),
+    Criterion("share_of_polyline", "share of those in a polyline as near to the laps"),
+    Criterion("numbers", "numbers in the law"),
+)
+def parameters(seed):
+    """How many numbers the law has beside one lap's samples, and beside a polyline no worse.
+
+    Matrix, subgoal and speed of each LDS, and the start, beside the coordinates of one lap, ten a
+    second; and beside those of the coarsest polyline with equal steps along the laps' mean that is
+    as near to it.
+    """
+    walks, law = recordings.figure_eight_laps(seed), recordings.figure_eight_task(seed).law
+    mean = mean_trajectory(walks)
+    error = distance_to_polyline(mean, law.response()).mean()
+    off = (distance_to_polyline(mean, resample(mean, n)).mean() for n in range(2, SHARES))
+    corners = next(n for n, each in enumerate(off, start=2) if each <= error)
+    count = 7 * len(law.segments) + 2  # A, subgoal and speed of each segment; the start
+    return {
+        "share_of_lap": count / np.mean([walk.size for walk in walks]),
+        "share_of_polyline": count / (2 * corners),
+        "numbers": float(count),
+    }
+
+
+@claim(
+    "III",
+    "captures the salient features of the trajectory such as direction, curvature, and speed",
+    Criterion("direction_deg", "mean difference of direction [degrees]", (0, 10)),
+    Criterion("curvature_correlation", "correlation of the curvatures", (0.8, 1)),
+    Criterion("speed_off_share", "mean difference of speed, share of the mean speed", (0, 0.1)),
+    Criterion("own_speed_off_share", "the same of the LDS's own steps"),
+)
+def salient(seed):
+    """How far direction, curvature and speed along the law are from those of the laps.
+
+    At 200 equal shares of the way. The law's speed is the mean speed that is kept for each segment:
+    re-timed LDS have none of their own. An LDS fitted to the samples as they are has one.
+    """
+    walks, law = recordings.figure_eight_laps(seed), recordings.figure_eight_task(seed).law
+    walked, planned = mean_trajectory(walks, SHARES), resample(law.response(), SHARES)
+    turns, planned_turns = headings(walked), headings(planned)
+    bends, planned_bends = np.gradient(turns), np.gradient(planned_turns)
+    speeds = np.mean([speeds_along(walk) for walk in walks], axis=0)
+    own = speeds_along(SequencedLDS.fit(walks, retimed=False).response())
+    return {
+        "direction_deg": np.degrees(np.abs(wrapped(turns - planned_turns)).mean()),
+        "curvature_correlation": np.corrcoef(bends, planned_bends)[0, 1],
+        "speed_off_share": np.abs(law.speeds[segments_along(law)] - speeds).mean() / speeds.mean(),
+        "own_speed_off_share": np.abs(own - speeds).mean() / speeds.mean(),
+    }
+
+
+def speeds_along(walk, period=0.1):
+    """Speeds (SHARES,) in m/s at equal shares of the way of a walk (N, 2), ten samples a s."""
+    walked = arc_length(walk)
+    shares = np.linspace(0, 1, SHARES)
+    moments = np.interp(shares * walked[-1], walked, period * np.arange(len(walk)))
+    return walked[-1] * np.gradient(shares) / np.maximum(np.gradient(moments), 1e-9)
+
+
+@claim(
+    "III",
+    "encoding the trajectory with a stable control law induced by the LDS",
+    Criterion("margin", "one minus the largest spectral radius of forty LDS", MORE),
+    Criterion("end_off_m", "how far from the last subgoal twenty responses end [m]", (0, 0.0101)),
+    constructed=True,
+)
+def stable(seed):
+    """How far below one the spectral radius of LDS is, and whence the law's response still arrives.
+
+    LDS of random walks of 3 to 59 steps, re-timed and not; responses of the figure-eight's law from
+    anywhere in the laboratory, which end within their reach of 0.01 m or not at all.
+    """
+    rng = np.random.default_rng([seed, 3])
+    walks = [rng.normal(size=(rng.integers(3, 60), 2)).cumsum(axis=0) for _ in range(20)]
+    fits = [LDS.fit(walk, retimed=retimed) for walk in walks for retimed in (True, False)]
+    law = recordings.figure_eight_task(seed).law
+    ends = [law.response(place)[-1] for place in rng.uniform([0, 0], [9, 7], (20, 2))]
+    return {
+        "margin": 1 - max(np.abs(np.linalg.eigvals(fit.A)).max() for fit in fits),
+        "end_off_m": np.linalg.norm(np.array(ends) - law.subgoals[-1], axis=1).max(),
+    }
+
+
+@claim(
+    "III",
+    "multiple demonstrations of a trajectory can be incorporated to compute a more accurate "
+    "generalization of the intended user trajectory",
+    Criterion("alone_more_m", "error of a law of one lap minus that of a law of several [m]", MORE),
+    Criterion("several_m", "error of a law of all laps but the last [m]"),
+)
+def laps(seed):
+    """Error on a lap of a law from one other lap, and of a law from all other laps.
+
+    Mean distance from a lap that was kept back, the last, to laws fitted to the first and to all
+    others.
+    """
+    *shown, kept = recordings.figure_eight_laps(seed)
+    alone, several = (SequencedLDS.fit(walks).error(kept) for walks in (shown[:1], shown))
+    return {"several_m": several, "alone_more_m": alone - several}
+
+
+@claim(
+    "III",
+    "a trajectory can be scaled or shifted by simply moving the subgoals and allowing the LDS to "
+    "interpolate its response",
+    Criterion("off_percent", "largest deviation from a scaled response, in % of its size", (0, 1)),
+    constructed=True,
+)
+def scaled(seed):
+    """How far the response to scaled and shifted subgoals is from the response scaled and shifted.
+
+    The largest distance between the two where subgoals and start of the figure-eight's law are
+    scaled by 0.5 to 2 and shifted by up to 3 m.
+    """
+    rng, law = np.random.default_rng([seed, 4]), recordings.figure_eight_task(seed).law
+    factor, shift = rng.uniform(0.5, 2.0), rng.uniform(-3, 3, 2)
+    wanted = factor * law.response() + shift
+    given = law.with_subgoals(factor * law.subgoals + shift, factor * law.start + shift).response()
+    size = np.linalg.norm(np.ptp(wanted, axis=0))
+    return {"off_percent": 100 * distance_to_polyline(wanted, given).max() / size}
+
+
+@claim(
+    "III",
+    "this estimated trajectory appears to capture the intentions of the original trajectory: a "
+    "“figure-eight” trajectory that avoids the obstacles",
+    Criterion("eight", "share of laws that go round the cans in opposite directions", MOSTLY, 1),
+    Criterion("clearance_m", "least distance from law to can [m]", MORE),
+)
+def figure(seed):
+    """Whether the law is a figure-eight, and how far from the obstacles it keeps.
+
+    Winding numbers of the law's response round both cans.
+    """
+    law, scene = recordings.figure_eight_task(seed).law, recordings.figure_eights(seed).scene
+    return {"eight": is_eight(law, scene), "clearance_m": clear_of(law, scene)}
+
+
+@claim(
+    "III",
+    "the estimated trajectory is represented by 6 LDS estimates and has an average error of 20 "
+    "millimeters compared to the original trajectory",
+    Criterion("n_segments", "number of LDS at a tolerance of 20 mm", (5.5, 6.5)),
+    Criterion("n_at_10_mm", "at 10 mm"),
+    Criterion("n_at_40_mm", "at 40 mm"),
+    Criterion("error_m", "at 20 mm: mean distance from the laps' mean to the law [m]"),
+    Criterion("error_laps_m", "at 20 mm: mean distance from the single laps to the law [m]"),
+)
+def segments(seed):
+    """Number of LDS at a tolerance of 20 mm, at half and at twice as much; mean errors at 20 mm.
+
+    Five figure-eights. The tolerance bounds the mean error of each segment, and the number of LDS
+    follows from it; so the error cannot exceed 20 mm and is no criterion.
+    """
+    walks, law = recordings.figure_eight_laps(seed), recordings.figure_eight_task(seed).law
+    return {
+        "n_segments": float(len(law.segments)),
+        "n_at_10_mm": float(len(SequencedLDS.fit(walks, tolerance=0.010).segments)),
+        "n_at_40_mm": float(len(SequencedLDS.fit(walks, tolerance=0.040).segments)),
+        "error_m": distance_to_polyline(mean_trajectory(walks), law.response()).mean(),
+        "error_laps_m": np.mean([law.error(walk) for walk in walks]),
+    }
