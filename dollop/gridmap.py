@@ -12,14 +12,7 @@ from dollop.formats import carmen_map
 from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError
 
-__all__ = [
-    "OccupancyGrid",
-    "check_is_map",
-    "covered_cells",
-    "flat_cells",
-    "in_cells",
-    "in_metres",
-]
+__all__ = ["OccupancyGrid", "check_is_map", "covered_cells", "flat_cells", "in_cells", "in_metres"]
 
 MAX_CELLS = 100_000_000
 

@@ -82,20 +82,20 @@ def read_map(path):
     FormatError
         If the YAML or its picture is not in order.
     """
-    keys = read_keys(path)
+    keys = _read_keys(path)
     for key in ("image", "resolution", "origin"):
         if key not in keys:
             raise FormatError(f"the key {key!r} is missing", path)
     origin = keys["origin"] if isinstance(keys["origin"], list) else []
-    origin = [number(path, "origin", value) for value in origin]
+    origin = [_number(path, "origin", value) for value in origin]
     if len(origin) != 3 or not abs(origin[2]) <= RIGHT_ANGLED:
         raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {keys['origin']!r}", path)
-    resolution = number(path, "resolution", keys["resolution"])
-    grey = read_grey(path, str(keys["image"]))[::-1]
-    return probabilities(path, keys, grey), origin[:2], resolution
+    resolution = _number(path, "resolution", keys["resolution"])
+    grey = _read_grey(path, str(keys["image"]))[::-1]
+    return _probabilities(path, keys, grey), origin[:2], resolution
 
 
-def read_keys(path):
+def _read_keys(path):
     """What the YAML holds, a dict."""
     try:
         keys = yaml.safe_load(read_bytes(path))
@@ -106,7 +106,7 @@ def read_keys(path):
     return keys
 
 
-def number(path, key, value):
+def _number(path, key, value):
     """The value as a float: YAML takes 1e-9, without a point, for text."""
     try:
         if isinstance(value, bool):
@@ -116,7 +116,7 @@ def number(path, key, value):
         raise FormatError(f"{key} must be a number, got {value!r}", path) from None
 
 
-def read_grey(path, name):
+def _read_grey(path, name):
     """Grey values (H, W) from 0 to 255 of the picture beside a map, of a coloured one the mean as
     in map_server.
     """
@@ -136,7 +136,7 @@ def read_grey(path, name):
     return colours[..., :3].mean(axis=2)
 
 
-def probabilities(path, keys, grey):
+def _probabilities(path, keys, grey):
     """Probabilities by the map's `mode`, set so that occupied and free cells are what the file's
     thresholds say.
     """
@@ -146,7 +146,7 @@ def probabilities(path, keys, grey):
     if negate not in (0, 1):  # or false and true
         raise FormatError(f"negate must be 0, 1, false or true, got {negate!r}", path)
     above, below = (
-        number(path, key, keys.get(key, usual)) for key, usual in (("occupied_thresh", 0.65), ("free_thresh", 0.196))
+        _number(path, key, keys.get(key, usual)) for key, usual in (("occupied_thresh", 0.65), ("free_thresh", 0.196))
     )
     if not 0 <= below <= above <= 1:
         rule = "thresholds must be 0 <= free_thresh <= occupied_thresh <= 1"
