@@ -1,3 +1,11 @@
-"""A robot under the control law of a task: direction, obstacles, localisation, performing (Sec.
-III).
-"""
+"""A robot under the law of a task: control, obstacles, localisation, performing (Sec. III)."""
+
+from dollop.robot.avoidance import ObstacleMap
+from dollop.robot.control import PIONEER_LIMITS, Guidance, Limits
+from dollop.robot.localization import MonteCarloLocalizer
+from dollop.robot.performing import Run, Unicycle, perform
+
+__all__ = [
+    "PIONEER_LIMITS", "Guidance", "Limits", "MonteCarloLocalizer", "ObstacleMap", "Run", "Unicycle",
+    "perform",
+]  # fmt: skip

@@ -1,16 +1,17 @@
-"""Obstacle-aware modulation of a control law: round what the robot knows of, and unchanged where
-nothing is near.
+"""Going round obstacles: a control law's direction turned along what is near, and shortest ways.
 
-The direction u of the law is turned along the surface of what is near (Khansari-Zadeh and Billard,
-"A dynamical system approach to realtime obstacle avoidance", Autonomous Robots 32, 2012): with n
-the unit normal away from the obstacle and t the tangent,
+Where nothing is near, the direction u of the law stays as it is, to the last bit. Elsewhere it is
+turned along the surface (Khansari-Zadeh and Billard, "A dynamical system approach to realtime
+obstacle avoidance", Autonomous Robots 32, 2012): with n the unit normal away from the obstacle and
+t the tangent,
 
     u' = (1 - 1/Gamma) (n.u) n + (1 + 1/Gamma) (t.u) t     where n.u < 0,    u' = u elsewhere.
 
 Gamma is 1 at the distance that is kept and grows to infinity where the influence ends; below the
 kept distance the factor of n is negative and the robot is led out. The normal comes from the
 distance field of the map, so that desks and walls need no shape of their own. In a concave corner
-this comes to a halt; the way out is then a `Geodesic`.
+this comes to a halt; the way out is then a `Geodesic`. The paper's robot knows of no obstacles: all
+of this is Dollop's own.
 """
 
 from dataclasses import dataclass, field
@@ -27,24 +28,25 @@ __all__ = ["FREE_BELOW", "Geodesic", "ObstacleMap"]
 ROBOT_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
 KEPT, INFLUENCE = 0.20, 0.50
-"""Distance in m between the robot's edge and an obstacle that the modulation keeps, and at which it
-sets in.
-"""
+"""Distances in m between the robot's edge and an obstacle: what the modulation keeps, and where it
+sets in."""
 TIGHT = KEPT / 3
 """Distance in m between the robot's edge and an obstacle that the shortest ways keep."""
 FREE_BELOW = 0.2
-"""Occupancy below which a cell is trusted to be free: a stool's thin column is missed by most beams
-in its cell.
-"""
+"""Occupancy below which a cell is free: most beams miss a stool's thin column in its cell."""
 CROWDING = 4.0
 """How many times longer a metre counts for the geodesic where the robot would touch something."""
 OPEN_BORDER = 3.0
-AHEAD = 6  # cells of a shortest path over which its direction is taken: one cell alone knows eight directions
+"""Border in m of a world without a map round all that is in it."""
+AHEAD = 6
+"""Cells of a shortest way over which its direction is taken: one alone knows eight directions."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObstacleMap:
     """Distances to what the robot must not touch, made for looking up one place at a time.
+
+    A place is anywhere in the plane; off the map, distances are those at its border.
 
     Attributes
     ----------
@@ -71,14 +73,14 @@ class ObstacleMap:
     origin: tuple
     resolution: float
     radius: float = ROBOT_RADIUS
-    lookup: list = field(init=False, repr=False)
+    _lookup: list = field(init=False, repr=False)
 
     def __post_init__(self):
-        object.__setattr__(self, "lookup", self.distances.ravel().tolist())  # lists answer single questions faster
+        object.__setattr__(self, "_lookup", self.distances.ravel().tolist())  # lists answer single questions faster
 
     @classmethod
     def of(cls, environment, background=None, places=(), radius=ROBOT_RADIUS, resolution=0.05):
-        """The obstacles of an environment before a background.
+        """The obstacles of an environment before a background (reconstruction).
 
         Parameters
         ----------
@@ -93,6 +95,18 @@ class ObstacleMap:
             The robot's in m.
         resolution : float
             Without a background: side of a cell in m.
+
+        Returns
+        -------
+        ObstacleMap
+
+        Examples
+        --------
+        A world without anything in it has room everywhere.
+
+        >>> from dollop.environment import Environment
+        >>> ObstacleMap.of(Environment([])).edge(12.0, -7.0) > 100
+        True
         """
         if background is None:
             origin, shape = open_frame(environment.boxes, places, resolution)
@@ -105,50 +119,106 @@ class ObstacleMap:
         return cls(signed_distance(blocked, resolution), origin, resolution, radius)
 
     def edge(self, x, y):
-        """Distance in m between the edge of a robot at x, y in m and the nearest obstacle, negative
-        in contact.
-        """
-        return self.edge_and_slope(x, y)[0]
+        """Distance between the edge of the robot and the nearest obstacle.
 
-    def edge_and_slope(self, x, y):
-        """`edge`, and how much it grows per m along x and along y; bilinear between the cells'
-        centres.
+        Parameters
+        ----------
+        x, y : float
+            Where the robot's centre is, in m.
+
+        Returns
+        -------
+        float
+            In m, negative in contact; bilinear between the centres of cells.
         """
+        return self._edge_and_slope(x, y)[0]
+
+    def _edge_and_slope(self, x, y):
+        """`edge` in m, and how much it grows per m along x and along y."""
         rows, columns = self.distances.shape
         across, up = in_cells(x, y, self.origin, self.resolution)
         across = min(max(across - 0.5, 0.0), columns - 1.001)
         up = min(max(up - 0.5, 0.0), rows - 1.001)
         column, row = int(across), int(up)
         right, top = across - column, up - row
-        corner, lookup = row * columns + column, self.lookup
+        corner, lookup = row * columns + column, self._lookup
         a, b, c, d = lookup[corner], lookup[corner + 1], lookup[corner + columns], lookup[corner + columns + 1]
         lower, upper = a + right * (b - a), c + right * (d - c)
         slope_x = ((b - a) * (1 - top) + (d - c) * top) / self.resolution
         return lower + top * (upper - lower) - self.radius, slope_x, (upper - lower) / self.resolution
 
     def cuts_corner(self, x, y, ahead_x, ahead_y):
-        """Whether half-way on the straight line from x, y to another place, in m, the robot has
-        next to no room.
+        """Whether half-way to another place, straight on, the robot has next to no room.
+
+        Parameters
+        ----------
+        x, y, ahead_x, ahead_y : float
+            Both places in m.
+
+        Returns
+        -------
+        bool
         """
         return self.edge((x + ahead_x) / 2, (y + ahead_y) / 2) <= TIGHT
 
     def edges(self, positions):
-        """`edge` for (N, 2) positions in m at once: (N,)."""
+        """`edge` for many places at once.
+
+        Parameters
+        ----------
+        positions : (N, 2) array_like
+            In m.
+
+        Returns
+        -------
+        (N,) float array
+            In m.
+
+        Examples
+        --------
+        A metre farther from the side of a box is a metre more room.
+
+        >>> from dollop.environment import Environment
+        >>> obstacles = ObstacleMap.of(Environment([[0, 0, 2, 2]]))
+        >>> obstacles.edges([[2.2, 1.0], [3.0, 1.0], [4.0, 1.0]]).round(2).tolist()
+        [-0.05, 0.75, 1.75]
+        """
         across, up = in_cells(*np.asarray(positions).T, self.origin, self.resolution)
         at = np.stack([up, across]) - 0.5
         return scipy.ndimage.map_coordinates(self.distances, at, order=1, mode="nearest") - self.radius
 
     def holds(self, x, y):
-        """Whether x, y in m lies on the map."""
+        """Whether a place lies on the map.
+
+        Parameters
+        ----------
+        x, y : float
+            In m.
+
+        Returns
+        -------
+        bool
+        """
         rows, columns = self.distances.shape
         across, up = in_cells(x, y, self.origin, self.resolution)
         return 0 <= across < columns and 0 <= up < rows
 
     def modulate(self, x, y, ux, uy):
-        """The direction (ux, uy) of a law at x, y in m, turned along what is near; unchanged where
-        nothing is.
+        """The direction of a law, turned along what is near (Khansari-Zadeh and Billard, 2012).
+
+        Parameters
+        ----------
+        x, y : float
+            Where the robot is, in m.
+        ux, uy : float
+            Unit vector in which the law sends it.
+
+        Returns
+        -------
+        (float, float)
+            Unit vector; the law's own where nothing is near, or where it leads away from it.
         """
-        edge, nx, ny = self.edge_and_slope(x, y)
+        edge, nx, ny = self._edge_and_slope(x, y)
         towards = nx * ux + ny * uy
         length = nx * nx + ny * ny
         if edge >= INFLUENCE or towards >= 0 or length < 1e-6:  # between two obstacles alike the slope is nought
@@ -162,29 +232,42 @@ class ObstacleMap:
         return (turned_x / size, turned_y / size) if size > 1e-9 else (ux, uy)
 
     def speed_limit(self, x, y, theta, deceleration, period):
-        """Speed in m/s from which a robot still stops before it touches, whatever the direction of
-        what is near.
+        """Speed from which a robot still stops before it touches, wherever what is near may be.
 
-        One that has next to no room left may only creep, and only outwards.
+        One that has next to no room left may only creep, and only outwards (reconstruction).
+
+        Parameters
+        ----------
+        x, y, theta : float
+            Pose in m and rad.
+        deceleration : float
+            That of braking in m/s^2.
+        period : float
+            Time in s that passes before the robot brakes.
+
+        Returns
+        -------
+        float
+            In m/s.
         """
-        edge, nx, ny = self.edge_and_slope(x, y)
+        edge, nx, ny = self._edge_and_slope(x, y)
         if edge <= 0.02:
             return 0.05 if nx * cos(theta) + ny * sin(theta) > 0.05 else 0.0
         return deceleration * (sqrt(period * period + 2 * edge / deceleration) - period)
 
     @cached_property
-    def passable(self):
+    def _passable(self):
         """(H, W) bool array: cells where the robot touches nothing, with some room to spare."""
         return self.distances - self.radius > TIGHT
 
     @cached_property
-    def nearest_passable(self):
+    def _nearest_passable(self):
         """Flat index of the passable cell nearest to each cell, as a list."""
-        row, column = scipy.ndimage.distance_transform_edt(~self.passable, return_distances=False, return_indices=True)
+        row, column = scipy.ndimage.distance_transform_edt(~self._passable, return_distances=False, return_indices=True)
         return (row * self.distances.shape[1] + column).ravel().tolist()
 
     @cached_property
-    def neighbours(self):
+    def _neighbours(self):
         """Sparse (H W, H W) costs in m between passable cells side by side or corner to corner."""
         rows, columns = self.distances.shape
         index = np.arange(rows * columns).reshape(rows, columns)
@@ -194,7 +277,7 @@ class ObstacleMap:
         for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
             here = np.s_[: rows - down, max(-right, 0) : columns - max(right, 0)]
             there = np.s_[down:, max(right, 0) : columns + min(right, 0)]
-            both = self.passable[here] & self.passable[there]
+            both = self._passable[here] & self._passable[there]
             heads.append(index[here][both])
             tails.append(index[there][both])
             costs.append(hypot(down, right) * (cost[here] + cost[there])[both] / 2)
@@ -202,65 +285,89 @@ class ObstacleMap:
             (np.concatenate(costs), (np.concatenate(heads), np.concatenate(tails))), shape=(index.size, index.size)
         ).tocsr()
 
-    def cell(self, x, y):
+    def _cell(self, x, y):
         """Flat index of the passable cell nearest to x, y in m."""
         rows, columns = self.distances.shape
         across, up = in_cells(x, y, self.origin, self.resolution)
         column, row = min(max(int(across), 0), columns - 1), min(max(int(up), 0), rows - 1)
-        return self.nearest_passable[row * columns + column]
+        return self._nearest_passable[row * columns + column]
 
-    def centre(self, cell):
+    def _centre(self, cell):
         """x, y in m of the centre of the cell with flat index `cell`."""
         row, column = divmod(cell, self.distances.shape[1])
         return in_metres(column + 0.5, row + 0.5, self.origin, self.resolution)
 
 
 class Geodesic:
-    """Shortest ways on an ObstacleMap to one place, or to the nearest place to it where the robot
-    has room.
+    """Shortest ways on an ObstacleMap to one place (Dijkstra's algorithm; reconstruction).
 
     Parameters
     ----------
     obstacles : ObstacleMap
     goal : (2,) sequence of float
-        m.
+        In m.
+
+    Attributes
+    ----------
+    goal : (float, float)
+        Where the ways end, in m: the centre of the cell nearest to it in which the robot has room.
     """
 
     def __init__(self, obstacles, goal):
         self.obstacles = obstacles
-        self.goal_cell = obstacles.cell(*goal)
-        self.goal = obstacles.centre(self.goal_cell)
+        self._goal_cell = obstacles._cell(*goal)
+        self.goal = obstacles._centre(self._goal_cell)
         distances, before = scipy.sparse.csgraph.dijkstra(
-            obstacles.neighbours, directed=False, indices=self.goal_cell, return_predecessors=True
+            obstacles._neighbours, directed=False, indices=self._goal_cell, return_predecessors=True
         )
-        self.distances, self.before = distances.tolist(), before.tolist()
+        self._distances, self._before = distances.tolist(), before.tolist()
 
     def distance(self, x, y):
-        """Length of the way from x, y in m, counted longer where it is narrow; `inf` where there is
-        none.
+        """Length of the way from a place.
+
+        Parameters
+        ----------
+        x, y : float
+            In m.
+
+        Returns
+        -------
+        float
+            In m, up to five times as long where it is narrow; `inf` where there is no way.
         """
-        return self.distances[self.obstacles.cell(x, y)]
+        return self._distances[self.obstacles._cell(x, y)]
 
     def direction(self, x, y):
-        """Unit vector along the way from x, y in m; zero where there is none, and at its end."""
-        cell = self.obstacles.cell(x, y)
-        if self.distances[cell] == inf:
+        """Direction of the way from a place.
+
+        Parameters
+        ----------
+        x, y : float
+            In m.
+
+        Returns
+        -------
+        (float, float)
+            Unit vector; zero where there is no way, and at its end.
+        """
+        cell = self.obstacles._cell(x, y)
+        if self._distances[cell] == inf:
             return 0.0, 0.0
-        edge, nx, ny = self.obstacles.edge_and_slope(x, y)
+        edge, nx, ny = self.obstacles._edge_and_slope(x, y)
         if edge <= TIGHT:  # first to where there is room, and outwards
-            (ux, uy), (nx, ny) = toward(*self.obstacles.centre(cell), x, y), toward(nx, ny, 0.0, 0.0)
+            (ux, uy), (nx, ny) = toward(*self.obstacles._centre(cell), x, y), toward(nx, ny, 0.0, 0.0)
             return toward(ux + nx, uy + ny, 0.0, 0.0)
-        cell = self.onward(cell)
+        cell = self._onward(cell)
         for _ in range(AHEAD - 1):
-            farther = self.onward(cell)
-            if self.obstacles.cuts_corner(x, y, *self.obstacles.centre(farther)):
+            farther = self._onward(cell)
+            if self.obstacles.cuts_corner(x, y, *self.obstacles._centre(farther)):
                 break
             cell = farther
-        return toward(*self.obstacles.centre(cell), x, y)
+        return toward(*self.obstacles._centre(cell), x, y)
 
-    def onward(self, cell):
+    def _onward(self, cell):
         """The next cell on the way; the last one stays."""
-        return self.before[cell] if cell != self.goal_cell else cell
+        return self._before[cell] if cell != self._goal_cell else cell
 
 
 def toward(ahead_x, ahead_y, x, y):
@@ -270,7 +377,7 @@ def toward(ahead_x, ahead_y, x, y):
 
 
 def open_frame(boxes, places, resolution):
-    """Corner and shape of a map that holds boxes (N, 4) and places (M, 2) with a border of 3 m."""
+    """Lower left corner and shape of a map that holds boxes (N, 4) and places (M, 2) in m."""
     points = np.concatenate([boxes[:, :2], boxes[:, 2:], np.reshape(places, (-1, 2))])
     if not len(points):
         points = np.zeros((1, 2))
@@ -280,9 +387,7 @@ def open_frame(boxes, places, resolution):
 
 
 def signed_distance(blocked, resolution):
-    """From the centre of each cell to the edge of what is blocked, in m, negative inside; far where
-    nothing is.
-    """
+    """Distances (H, W) in m from cells' centres to the edge of what is blocked, negative inside."""
     if not blocked.any():
         return np.full(blocked.shape, 1e3)
     outside = scipy.ndimage.distance_transform_edt(~blocked)

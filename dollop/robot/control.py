@@ -17,8 +17,8 @@ user would have done from there. Two control laws make v and omega of it:
 The paper gives neither the rule of handing over nor a controller: both are reconstructions.
 """
 
-from collections import namedtuple
 from math import atan2, cos, hypot, sin
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -29,13 +29,11 @@ from dollop.robot.avoidance import Geodesic
 __all__ = ["CONTROL_LAWS", "PIONEER_LIMITS", "REACH", "Guidance", "Limits", "clip"]
 
 REACH = 0.25
-"""How near to its subgoal a segment hands over, in m: a robot that needs 0.6 m to turn would circle
-nearer ones.
-"""
+"""Distance in m from its subgoal at which a segment hands over: a robot that needs 0.6 m to turn
+would circle nearer ones."""
 PATIENCE = 8.0
 """Time in s without progress after which the way is changed or the speed halved; turning round
-takes half of it.
-"""
+takes half of it."""
 STEP = 0.05
 """Distance in m between the places of a response that is pursued."""
 LOOK_AHEAD = 7
@@ -58,86 +56,176 @@ with 3."""
 SLOWEST = 1 / 16
 """Share of the demonstrated speed below which a robot that makes no progress gives up."""
 
-Limits = namedtuple("Limits", "speed turn acceleration turn_acceleration")
+
+class Limits(NamedTuple):
+    """What a robot can do.
+
+    Attributes
+    ----------
+    speed : float
+        In m/s.
+    turn : float
+        Turning rate in rad/s.
+    acceleration : float
+        In m/s^2, and as much of braking.
+    turn_acceleration : float
+        In rad/s^2.
+    """
+
+    speed: float
+    turn: float
+    acceleration: float
+    turn_acceleration: float
+
+
 PIONEER_LIMITS = Limits(0.5, 0.8, 0.5, 1.57)
-"""Speed in m/s, turning rate in rad/s (CARMEN, p2d8+), accelerations in m/s^2 and rad/s^2 (Stage,
-pioneer.inc).
-"""
+"""Of a Pioneer 2 DX: speeds by CARMEN (p2d8+), accelerations by Stage (pioneer.inc)."""
 
 
 def clip(value, limit):
-    """The value cut to [-limit, limit]."""
+    """A number cut to a range round zero.
+
+    Parameters
+    ----------
+    value, limit : float
+        Of one unit.
+
+    Returns
+    -------
+    float
+        In [-limit, limit].
+
+    Examples
+    --------
+    >>> clip(-0.7, 0.5), clip(0.2, 0.5)
+    (-0.5, 0.2)
+    """
     return max(-limit, min(limit, value))
 
 
 class Guidance:
-    """The direction of a sequenced LDS at any state, round obstacles if it is given any.
+    """The direction of a sequenced LDS at any state (Sec. III), round obstacles if it is given any.
 
     Parameters
     ----------
     law : SequencedLDS
     obstacles : ObstacleMap, optional
+        What to go round; the paper's law goes round nothing.
 
     Attributes
     ----------
+    goals : list of (float, float)
+        Subgoal of each segment in m.
     detours : dict
         For a segment whose response does not get through: the `Geodesic` to its subgoal that is
         followed instead, or, without obstacles, None for the straight line.
+
+    Examples
+    --------
+    The direction is that of the step that the LDS would take from there.
+
+    >>> from dollop.sequenced_lds import SequencedLDS
+    >>> law = SequencedLDS.fit(np.linspace([0.0, 0.0], [3.0, 1.0], 50))
+    >>> step = law.segments[0].step([1.0, 2.0]) - [1.0, 2.0]
+    >>> bool(np.allclose(Guidance(law).direction(0, 1.0, 2.0), step / np.linalg.norm(step)))
+    True
     """
 
     def __init__(self, law, obstacles=None):
         self.obstacles = obstacles
         self.goals = [tuple(segment.goal.tolist()) for segment in law.segments]
-        self.steps = [(segment.A - np.eye(2)).ravel().tolist() for segment in law.segments]
-        self.weights = [
+        self._steps = [(segment.A - np.eye(2)).ravel().tolist() for segment in law.segments]
+        self._weights = [
             scipy.linalg.solve_discrete_lyapunov(s.A.T, np.eye(2))[[0, 0, 1], [0, 1, 1]].tolist() for s in law.segments
         ]
-        self.detours, self.geodesics = {}, {}
+        self.detours, self._geodesics = {}, {}
 
     def direction(self, k, x, y):
-        """Unit vector in which segment k sends a robot at x, y in m."""
-        if k in self.detours:
-            return self.detour_direction(k, x, y)
-        return self.round_obstacles(x, y, *self.response_direction(k, x, y))
+        """Direction in which a segment sends a robot.
 
-    def response_direction(self, k, x, y):
+        Parameters
+        ----------
+        k : int
+            The segment.
+        x, y : float
+            Where the robot is, in m.
+
+        Returns
+        -------
+        (float, float)
+            Unit vector; zero at the subgoal.
+        """
+        if k in self.detours:
+            return self._detour_direction(k, x, y)
+        return self._round_obstacles(x, y, *self._response_direction(k, x, y))
+
+    def _response_direction(self, k, x, y):
         """Unit vector of (A_k - I)(p - g_k) at p = (x, y)."""
-        (gx, gy), (a, b, c, d) = self.goals[k], self.steps[k]
+        (gx, gy), (a, b, c, d) = self.goals[k], self._steps[k]
         x, y = x - gx, y - gy
         return unit(a * x + b * y, c * x + d * y)
 
-    def round_obstacles(self, x, y, ux, uy):
+    def _round_obstacles(self, x, y, ux, uy):
         """The direction (ux, uy) at x, y in m, modulated if there are obstacles."""
         return self.obstacles.modulate(x, y, ux, uy) if self.obstacles else (ux, uy)
 
-    def detour_direction(self, k, x, y):
+    def _detour_direction(self, k, x, y):
         """Unit vector along the shortest way to subgoal k."""
         if self.detours[k]:
             return self.detours[k].direction(x, y)
         return unit(self.goals[k][0] - x, self.goals[k][1] - y)
 
     def detour(self, k):
-        """Leave the response of segment k for the shortest way to its subgoal."""
-        if self.obstacles and k not in self.geodesics:
-            self.geodesics[k] = Geodesic(self.obstacles, self.goals[k])
-        self.detours[k] = self.geodesics.get(k)
+        """Leave the response of a segment for the shortest way to its subgoal (reconstruction).
+
+        Parameters
+        ----------
+        k : int
+            The segment.
+        """
+        if self.obstacles and k not in self._geodesics:
+            self._geodesics[k] = Geodesic(self.obstacles, self.goals[k])
+        self.detours[k] = self._geodesics.get(k)
 
     def remaining(self, k, x, y):
-        """What falls on the way to subgoal k: the length of a detour, else the Lyapunov measure
-        |x|_P of the offset.
+        """What falls on the way to a subgoal: a detour's length, else the Lyapunov measure |x|_P.
 
-        P solves A^T P A - P = -I. Along u the measure falls, for x^T P x is convex and falls from x
-        to A x.
+        P solves A^T P A - P = -I, and x is the offset from the subgoal. Along u the measure falls,
+        for x^T P x is convex and falls from x to A x (reconstruction).
+
+        Parameters
+        ----------
+        k : int
+            The segment.
+        x, y : float
+            Where the robot is, in m.
+
+        Returns
+        -------
+        float
+            In m; `inf` where a detour does not lead to the subgoal.
         """
         if self.detours.get(k):
             return self.detours[k].distance(x, y)
-        (gx, gy), (p, q, r) = self.goals[k], self.weights[k]
+        (gx, gy), (p, q, r) = self.goals[k], self._weights[k]
         x, y = x - gx, y - gy
         return (p * x * x + 2 * q * x * y + r * y * y) ** 0.5
 
     def reached(self, k, x, y, reach):
-        """Whether x, y in m is within reach of subgoal k, or of the place nearest to it where the
-        robot has room.
+        """Whether a robot is within reach of a subgoal, or of where the detour to it ends.
+
+        Parameters
+        ----------
+        k : int
+            The segment.
+        x, y : float
+            Where the robot is, in m.
+        reach : float
+            Distance in m.
+
+        Returns
+        -------
+        bool
         """
         gx, gy = self.goals[k]
         if hypot(x - gx, y - gy) < reach:
@@ -147,47 +235,60 @@ class Guidance:
         gx, gy = self.detours[k].goal
         return hypot(x - gx, y - gy) < reach
 
-    def leg(self, k, x, y):
-        """The response of segment k rolled out from x, y in m: a list of places 5 cm apart, and
-        whether it arrived.
-        """
+    def _leg(self, k, x, y):
+        """Places 5 cm apart on the response of segment k from x, y in m, and whether it arrived."""
         places, ahead = [], (x, y)
         for _ in range(round(FARTHEST / STEP)):
             if self.reached(k, x, y, STEP):
                 return places, True
-            ahead = self.state_ahead(k, ahead, x, y)
+            ahead = self._state_ahead(k, ahead, x, y)
             wish = unit(ahead[0] - x, ahead[1] - y)
-            ux, uy = self.detour_direction(k, x, y) if k in self.detours else self.round_obstacles(x, y, *wish)
+            ux, uy = self._detour_direction(k, x, y) if k in self.detours else self._round_obstacles(x, y, *wish)
             x, y = x + STEP * ux, y + STEP * uy
             if (ux, uy) != wish:  # led elsewhere, the response goes on from there
                 ahead = x, y
             places.append((x, y))
         return places, False
 
-    def state_ahead(self, k, state, x, y):
-        """The first state of segment k from `state` on that is 5 cm from x, y in m, or comes to the
-        subgoal.
+    def _state_ahead(self, k, state, x, y):
+        """The first of the states of segment k from `state` on that is 5 cm from x, y in m.
+
+        It is the subgoal where the response comes that near to it before.
         """
-        (gx, gy), (a, b, c, d) = self.goals[k], self.steps[k]
+        (gx, gy), (a, b, c, d) = self.goals[k], self._steps[k]
         while distance(state, x, y) < STEP <= distance(state, gx, gy):
             offset_x, offset_y = state[0] - gx, state[1] - gy
             state = state[0] + a * offset_x + b * offset_y, state[1] + c * offset_x + d * offset_y
         return state if distance(state, x, y) >= STEP else (gx, gy)
 
     def way(self, k, x, y):
-        """Legs of all segments from k on, from x, y in m: places and the segment each belongs to.
+        """The responses of a segment and of all after it, rolled out one after the other.
 
-        A leg that does not arrive is replaced by a detour; where that does not arrive either, the
-        way ends.
+        Where one does not arrive, a detour takes its place; where that does not arrive either, the
+        way ends (reconstruction).
+
+        Parameters
+        ----------
+        k : int
+            The segment.
+        x, y : float
+            Where the robot is, in m.
+
+        Returns
+        -------
+        places : list of (float, float)
+            In m, 5 cm apart; the first is where the robot is.
+        segments : list of int
+            The segment that each belongs to.
         """
         places, segments = [(x, y)], [k]
         for segment in range(k, len(self.goals)):
             if segment > k:
                 self.detours.pop(segment, None)
-            leg, arrived = self.leg(segment, *places[-1])
+            leg, arrived = self._leg(segment, *places[-1])
             if not arrived:
                 self.detour(segment)
-                leg, arrived = self.leg(segment, *places[-1])
+                leg, arrived = self._leg(segment, *places[-1])
             if not arrived:
                 break
             places += leg
@@ -201,7 +302,15 @@ def lyapunov_weights(A):
 
 
 class Supervisor:
-    """Which segment is in force, and whether the robot gets on with it.
+    """Which segment is in force, and whether the robot gets on with it (Sec. III; reconstruction).
+
+    Parameters
+    ----------
+    guidance : Guidance
+    speeds : (K,) sequence of float
+        At which each segment was demonstrated, in m/s.
+    robot : Unicycle, or another
+        Its limits, period and pose.
 
     Attributes
     ----------
@@ -209,6 +318,8 @@ class Supervisor:
         The segment in force.
     done : bool
         Whether the last one has handed over.
+    hopeless : bool
+        Whether there is no progress, however slow the robot.
     pace : float
         Share of the demonstrated speed. It is halved when there is no progress: the slower a robot,
         the more exactly it can follow the direction of the law, whose Lyapunov measure falls
@@ -223,9 +334,7 @@ class Supervisor:
         self.restart()
 
     def restart(self):
-        """Begin the segment in force: at its full pace, without a detour, with all the time in the
-        world.
-        """
+        """Begin the segment in force: at its full pace, without a detour, and with new patience."""
         self.pace, self.best, self.waited = 1.0, float("inf"), 0.0
         self.guidance.detours.pop(self.active, None)
 
@@ -244,9 +353,7 @@ class Supervisor:
             self.insist()
 
     def insist(self):
-        """Take a detour; if there is one already, halve the pace; if that is very low already, give
-        up.
-        """
+        """Take a detour; where there is one already, halve the pace, and in the end give up."""
         self.best, self.waited = float("inf"), 0.0
         if self.guidance.obstacles and self.active not in self.guidance.detours:
             self.guidance.detour(self.active)
@@ -269,12 +376,13 @@ class Supervisor:
 
 
 class Plain(Supervisor):
-    """Turn towards the law's direction, drive at the demonstrated speed: v = s max(0, cos e), omega
-    = 3 e.
+    """Turn towards the law's direction, and drive at the demonstrated speed s.
+
+    With e the heading error in rad, v = s cos e and omega = 3 e; where e is sharp, v = 0.
     """
 
     def command(self, x, y, theta):
-        """v in m/s and omega in rad/s for a pose."""
+        """v in m/s and omega in rad/s for a pose in m and rad."""
         self.notice_kidnapping(x, y)
         if self.guidance.reached(self.active, x, y, REACH):
             self.hand_over(self.active + 1)
@@ -299,9 +407,7 @@ class Pursuit(Supervisor):
     at = 0
 
     def plan(self, x, y):
-        """Roll the response out from x, y in m; beyond its end it goes straight on, for something
-        to pursue.
-        """
+        """Roll the response out from x, y in m, and straight on beyond its end, to be pursued."""
         self.places, self.segments = self.guidance.way(self.active, x, y)
         self.at, self.end = 0, len(self.places) - 1
         ux, uy = self.guidance.direction(len(self.speeds) - 1, *self.places[max(self.end - 1, 0)])
@@ -311,7 +417,7 @@ class Pursuit(Supervisor):
         self.planned = bend_speeds(np.array(self.places), demonstrated, self.limits).tolist()
 
     def command(self, x, y, theta):
-        """v in m/s and omega in rad/s for a pose."""
+        """v in m/s and omega in rad/s for a pose in m and rad."""
         self.notice_kidnapping(x, y)
         if distance(self.places[self.at], x, y) > STRAY:
             self.plan(x, y)
@@ -327,9 +433,7 @@ class Pursuit(Supervisor):
         return speed, curvature * speed
 
     def pursued(self, x, y):
-        """The place 0.35 m ahead on the response, or a nearer one where going straight there would
-        cut a corner.
-        """
+        """The place 0.35 m ahead, or a nearer one where going straight there would cut a corner."""
         obstacles = self.guidance.obstacles
         for place in self.places[self.at + LOOK_AHEAD : self.at + 1 : -1]:
             if not obstacles or not obstacles.cuts_corner(x, y, *place):
@@ -342,8 +446,7 @@ class Pursuit(Supervisor):
         self.places, self.at = Pursuit.places, 0
 
     def advance(self, x, y):
-        """Move on along the response to the nearest place in the look-ahead, handing over where its
-        segments do.
+        """Move on to the nearest place in the look-ahead, and hand over where the response does.
 
         The whole look-ahead counts: before a sharp turn at a subgoal the next place may be farther
         off, and those after the turn nearer.
@@ -368,8 +471,7 @@ def distance(place, x, y):
 
 
 def bend_speeds(places, speeds, limits):
-    """Speed in m/s at which to pass each of (N, 2) places: as demonstrated, but such that bends can
-    be turned.
+    """Speeds (N,) in m/s at which to pass places (N, 2): as demonstrated, but slower in bends.
 
     A fifth of the turning rate stays in hand for corrections. Before a bend the speed falls no
     faster than it can.
@@ -384,3 +486,4 @@ def bend_speeds(places, speeds, limits):
 
 
 CONTROL_LAWS = {"plain": Plain, "pursuit": Pursuit}
+"""By name: classes whose `command` takes a pose and returns v in m/s and omega in rad/s."""

@@ -1,13 +1,12 @@
-"""Monte Carlo localisation: where the robot is, from odometry and laser on the background map
-(CARMEN's part).
+"""Monte Carlo localisation: where the robot is, from odometry and laser on the background map.
 
-Particles move by the odometry and its error, and are weighed by a likelihood field: a beam that
-ends at distance d from the nearest thing on the map has
+The paper leaves this to CARMEN; what is here is a reconstruction. Particles move by the odometry
+and its error, and are weighed by a likelihood field: a beam that ends at distance d from the
+nearest thing on the map has
 
     q(d) = exp(-d^2 / (2 sigma^2)),    likelihood = floor + (1 - floor) q(d),
 
-so that whatever is not on the map costs no more than the floor: a person, a trash can, a mixed
-pixel.
+so that what is not on the map costs no more than the floor: a person, a trash can, a mixed pixel.
 
 A kidnapping is noticed by the fit of a scan, the mean q of its beams at the pose: it falls below
 its long average, as in augmented Monte Carlo localisation (Thrun, Burgard and Fox, "Probabilistic
@@ -30,9 +29,8 @@ from dollop.robot.avoidance import FREE_BELOW
 __all__ = ["MonteCarloLocalizer"]
 
 SIGMA, WIDE_SIGMA = 0.10, 0.20
-"""Standard deviation in m of the likelihood field: for particles, and for a lattice, which misses
-the true pose.
-"""
+"""Standard deviations in m of the likelihood field: for particles, and for a lattice, which misses
+the true pose."""
 FLOOR = 0.10
 """Likelihood of a beam that the map does not explain."""
 INDEPENDENT = 0.3
@@ -47,8 +45,7 @@ NARROW = (0.15, 0.15)
 """Standard deviations in m and rad below which particles agree."""
 BELIEVED_AFTER, GIVEN_UP_AFTER = pi, 2 * pi
 """Angles in rad to turn until a pose that explains every scan is believed, and until the search
-starts anew.
-"""
+starts anew."""
 LOST = 0.65
 """Share of its long average below which the fit of a scan is in doubt."""
 DOUBTS = 3
@@ -60,11 +57,13 @@ USUAL_FIT, FORGETTING = 0.8, 0.01
 class MonteCarloLocalizer:
     """Particles that follow a robot, notice when it has been moved, and find it again.
 
+    From "Probabilistic Robotics" (2005) and Lenser and Veloso (2000), see the top of this module.
+
     Parameters
     ----------
     background : OccupancyGrid
         The map.
-    angles : (B,) array
+    angles : (B,) array_like
         Bearing of each beam in rad.
     environment : Environment, optional
         Boxes that are known to stand there as well.
@@ -82,6 +81,8 @@ class MonteCarloLocalizer:
         Standard deviation of the particles in m, in the plane, and in rad.
     fit : float
         Mean q of the last scan at the pose: how well the map explains it, from 0 to 1.
+    particles : (N, 3) float array or None
+        Guesses of the pose; None until the scan that a search begins with.
     converged : bool
         Whether the pose is followed, and not searched for.
 
@@ -92,8 +93,8 @@ class MonteCarloLocalizer:
     """
 
     def __init__(self, background, angles, environment=None, pose=None, laser_offset=0.0, seed=0):
-        self.rng = np.random.default_rng(seed)
-        self.bearings, self.laser_offset = np.asarray(angles, dtype=float)[::BEAM_STEP], laser_offset
+        self._rng = np.random.default_rng(seed)
+        self._bearings, self._laser_offset = np.asarray(angles, dtype=float)[::BEAM_STEP], laser_offset
         blocked = background.occupied
         if environment is not None:
             boxes = environment.boxes
@@ -103,10 +104,10 @@ class MonteCarloLocalizer:
             raise ValueError("the background must have a free cell for the robot to be in, got none")
         surface = blocked & ~scipy.ndimage.binary_erosion(blocked, border_value=1)  # no beam ends inside what is solid
         distances = scipy.ndimage.distance_transform_edt(~surface, sampling=background.resolution)
-        self.field = LikelihoodField(distances, SIGMA, background.origin, background.resolution)
-        self.wide_field = LikelihoodField(distances, WIDE_SIGMA, background.origin, background.resolution)
-        self.lattice = lattice(free, background)
-        self.usual_fit = USUAL_FIT
+        self._field = LikelihoodField(distances, SIGMA, background.origin, background.resolution)
+        self._wide_field = LikelihoodField(distances, WIDE_SIGMA, background.origin, background.resolution)
+        self._lattice = lattice(free, background)
+        self._usual_fit = USUAL_FIT
         self.pose, self.spread, self.fit = np.full(3, np.nan), np.full(2, np.inf), 0.0
         if pose is None:
             self.search()
@@ -115,21 +116,34 @@ class MonteCarloLocalizer:
 
     @property
     def localised(self):
-        """Whether the pose is to be believed: converged, and the last scan not in doubt."""
-        return self.converged and self.doubts == 0
+        """Bool: whether the pose is to be believed: converged, and the last scan not in doubt."""
+        return self.converged and self._doubts == 0
 
     def start(self, pose, spread=(0.05, 0.05)):
-        """Believe a pose (3,), with standard deviations in m and rad."""
-        self.pose, self.spread, self.fit = np.array(pose, dtype=float), np.array(spread), self.usual_fit
+        """Believe a pose.
+
+        Parameters
+        ----------
+        pose : (3,) sequence of float
+            x, y in m, theta in rad.
+        spread : (float, float)
+            Standard deviations in m and rad.
+
+        Raises
+        ------
+        ValueError
+            If the pose is not finite.
+        """
+        self.pose, self.spread, self.fit = np.array(pose, dtype=float), np.array(spread), self._usual_fit
         if not np.isfinite(self.pose).all():
             raise ValueError(f"pose must be finite, got {tuple(pose)}")
-        self.particles = self.pose + self.rng.standard_normal((TRACKING, 3)) * [spread[0], spread[0], spread[1]]
-        self.converged, self.doubts = True, 0
+        self.particles = self.pose + self._rng.standard_normal((TRACKING, 3)) * [spread[0], spread[0], spread[1]]
+        self.converged, self._doubts = True, 0
 
     def search(self):
         """Believe nothing; the next scan draws the particles."""
-        self.particles, self.converged, self.doubts = None, False, 0
-        self.turned = self.agreed = 0.0
+        self.particles, self.converged, self._doubts = None, False, 0
+        self._turned = self._agreed = 0.0
 
     def update(self, motion, ranges):
         """Take in what happened in one control period.
@@ -138,66 +152,62 @@ class MonteCarloLocalizer:
         ----------
         motion : (3,) sequence of float
             By odometry, as `dollop.pose.motion_between` has it.
-        ranges : (B,) array
+        ranges : (B,) array_like
             The scan after it in m, `inf` where nothing came back.
         """
-        ends = self.beam_ends(np.asarray(ranges, dtype=float))
+        ends = self._beam_ends(np.asarray(ranges, dtype=float))
         moved = bool(np.abs(motion).max() > 1e-4)
         if self.particles is None:
-            self.particles = self.draw(ends)
+            self.particles = self._draw(ends)
         elif moved:
-            self.particles = moved_particles(self.particles, motion, self.rng)
-        weights = softmax(INDEPENDENT * self.field.log_likelihoods(self.particles, ends))
+            self.particles = moved_particles(self.particles, motion, self._rng)
+        weights = softmax(INDEPENDENT * self._field.log_likelihoods(self.particles, ends))
         self.pose, self.spread = mean_pose(self.particles, weights)
-        self.fit = float(self.field.values(self.pose[None], ends).mean()) if len(ends) else 0.0
+        self.fit = float(self._field.values(self.pose[None], ends).mean()) if len(ends) else 0.0
         if moved:  # the same view again would be no new evidence
-            self.particles = self.resampled(weights)
-        self.judge(abs(motion[2]))
+            self.particles = self._resampled(weights)
+        self._judge(abs(motion[2]))
 
-    def judge(self, turn):
-        """Doubt a pose that was believed, or believe one that was searched for, after a turn of so
-        many rad.
-        """
-        fits = self.fit >= LOST * self.usual_fit
+    def _judge(self, turn):
+        """Doubt a pose that was believed, or believe one searched for, after a turn in rad."""
+        fits = self.fit >= LOST * self._usual_fit
         if self.converged:
-            self.doubts = 0 if fits else self.doubts + 1
-            self.usual_fit += FORGETTING * (self.fit - self.usual_fit) if fits else 0.0
-            if self.doubts >= DOUBTS:
+            self._doubts = 0 if fits else self._doubts + 1
+            self._usual_fit += FORGETTING * (self.fit - self._usual_fit) if fits else 0.0
+            if self._doubts >= DOUBTS:
                 self.search()
             return
-        self.turned += turn
-        self.agreed = self.agreed + turn if fits and self.agreeing else 0.0
-        self.converged = self.agreed >= BELIEVED_AFTER
-        if not self.converged and self.turned > GIVEN_UP_AFTER:
+        self._turned += turn
+        self._agreed = self._agreed + turn if fits and self._agreeing else 0.0
+        self.converged = self._agreed >= BELIEVED_AFTER
+        if not self.converged and self._turned > GIVEN_UP_AFTER:
             self.search()
 
     @property
-    def agreeing(self):
+    def _agreeing(self):
         """Whether the particles agree on one pose."""
         return bool((self.spread < NARROW).all())
 
-    def beam_ends(self, ranges):
+    def _beam_ends(self, ranges):
         """Where the used beams end in the robot's frame: (M, 2) in m."""
         ranges = ranges[::BEAM_STEP]
         back = np.isfinite(ranges)
-        directions = np.column_stack([np.cos(self.bearings[back]), np.sin(self.bearings[back])])
-        return ranges[back, None] * directions + [self.laser_offset, 0.0]
+        directions = np.column_stack([np.cos(self._bearings[back]), np.sin(self._bearings[back])])
+        return ranges[back, None] * directions + [self._laser_offset, 0.0]
 
-    def draw(self, ends):
-        """Particles (N, 3) drawn from the scan: lattice poses by their likelihood, spread over
-        their meshes.
-        """
+    def _draw(self, ends):
+        """Particles (N, 3) from a scan: lattice poses by their likelihood, spread over meshes."""
         headings = np.arange(HEADINGS) * (2 * pi / HEADINGS)
-        scores = [self.wide_field.lattice_log_likelihoods(self.lattice, heading, ends[::2]) for heading in headings]
+        scores = [self._wide_field.lattice_log_likelihoods(self._lattice, heading, ends[::2]) for heading in headings]
         chances = softmax(2 * INDEPENDENT * np.concatenate(scores))
-        heading, place = np.divmod(self.rng.choice(len(chances), SEARCHING, p=chances), len(self.lattice))
-        meshes = self.rng.uniform(-0.5, 0.5, (SEARCHING, 3)) * [LATTICE, LATTICE, 2 * pi / HEADINGS]
-        return np.column_stack([self.lattice[place], headings[heading]]) + meshes
+        heading, place = np.divmod(self._rng.choice(len(chances), SEARCHING, p=chances), len(self._lattice))
+        meshes = self._rng.uniform(-0.5, 0.5, (SEARCHING, 3)) * [LATTICE, LATTICE, 2 * pi / HEADINGS]
+        return np.column_stack([self._lattice[place], headings[heading]]) + meshes
 
-    def resampled(self, weights):
+    def _resampled(self, weights):
         """Particles (N, 3) drawn with the weights by one comb, few if they agree."""
-        count = TRACKING if self.agreeing else SEARCHING
-        comb = (np.arange(count) + self.rng.random()) / count
+        count = TRACKING if self._agreeing else SEARCHING
+        comb = (np.arange(count) + self._rng.random()) / count
         chosen = np.searchsorted(np.cumsum(weights), comb).clip(max=len(weights) - 1)
         return self.particles[chosen]
 
@@ -236,9 +246,7 @@ class LikelihoodField:
         return self.log_table[self.cells(poses, ends)].sum(axis=1)
 
     def lattice_log_likelihoods(self, places, heading, ends):
-        """The same for places (N, 2) that share a heading in rad; beams are moved by whole cells,
-        which is faster.
-        """
+        """The same for places (N, 2) of one heading in rad, beams moved by whole cells: fast."""
         here = self.cells(np.column_stack([places, np.zeros(len(places))]), np.zeros((1, 2)))
         there = np.rint(self.within_reach(ends) @ rotation(heading).T / self.resolution).astype(np.int32)
         return self.log_table[here + (there[:, 1] * self.columns + there[:, 0])].sum(axis=1)
@@ -269,8 +277,8 @@ def lattice(free, background):
 def moved_particles(particles, motion, rng):
     """Particles (N, 3) after a motion (3,) by odometry, each with an error of its own.
 
-    Standard deviations: 10 % of the way and 2 mm along it, 5 % and 2 mm across; 10 % of the turn, 3
-    degrees per m and 0.1 degrees.
+    Standard deviations: 10 % of the way and 2 mm along it, 5 % and 2 mm across; 10 % of the turn,
+    3 degrees per m and 0.1 degrees.
     """
     ahead, left, turn = motion
     way = np.hypot(ahead, left)

@@ -19,20 +19,20 @@ from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits,
 __all__ = ["Run", "Unicycle", "perform"]
 
 SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
-"""A robot that does not know where it is turns on the spot, rad/s, and moves off what it touches,
-m/s: back, and if that has not helped within so many s, forth."""
+"""A robot that does not know where it is turns on the spot, in rad/s, and moves off what it
+touches, in m/s: back, and if that has not helped within so many s, forth."""
 HELD = 1.0
 """Time in s for which a robot goes on to move off what it touched."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What came of performing a task.
+    """What came of performing a task (Sec. III).
 
     Attributes
     ----------
     t : (N,) float array
-        s from the start, one control period apart.
+        In s from the start, one control period apart.
     poses : (N, 3) float array
         x, y in m, theta in rad, as the robot believed it.
     true_poses : (N, 3) float array
@@ -73,8 +73,7 @@ class Run:
 
 
 class Unicycle:
-    """A kinematic robot with the Pioneer's limits that knows its pose; it passes through what it
-    hits.
+    """A robot without mass that knows its pose, and passes through what it hits (reconstruction).
 
     Parameters
     ----------
@@ -104,13 +103,25 @@ class Unicycle:
         self.place(pose)
 
     def place(self, pose):
-        """Put the robot at rest at a pose."""
+        """Put the robot at rest at a pose.
+
+        Parameters
+        ----------
+        pose : (3,) sequence of float
+            x, y in m, theta in rad.
+        """
         self.pose = tuple(float(value) for value in pose)
         self.speed = self.turn = 0.0
 
     def drive(self, speed, turn):
-        """Move for one period towards a speed in m/s and a turning rate in rad/s, within the
-        limits.
+        """Move for one period, towards the speeds asked for as far as the limits allow.
+
+        Parameters
+        ----------
+        speed : float
+            In m/s.
+        turn : float
+            In rad/s, counter-clockwise.
         """
         limits, period = self.limits, self.period
         self.speed = approach(self.speed, clip(speed, limits.speed), limits.acceleration * period)
@@ -146,7 +157,7 @@ def perform(
         See the top of `dollop.robot.performing`. Where it stands is where it starts. It drives
         until the task is finished or given up.
     control : str
-        "plain" or "pursuit", the better one.
+        "plain", the paper's kind, or "pursuit", the better one.
     avoid : bool
         Go round obstacles; the paper's law does not.
     background : OccupancyGrid, optional
@@ -168,6 +179,17 @@ def perform(
     ValueError
         For an unknown control law, a start, subgoal or kidnapping that is not finite, off the map
         or in an obstacle, a time-out that is not positive, or a kidnapping before the start.
+
+    Examples
+    --------
+    Kidnapped on its way, the robot goes on to the subgoal all the same.
+
+    >>> from dollop import Demonstration, Environment, Task
+    >>> walk = np.linspace([0.0, 0.0], [3.0, 1.0], 50)
+    >>> task = Task.of(Demonstration(walk, Environment([[1.5, 2.0, 2.0, 2.5]])))
+    >>> run = perform(task, Unicycle((0.0, 0.0, 0.3)), kidnap=[(3.0, (0.0, 2.0, 1.0))])
+    >>> run.finished, run.collisions, bool(np.hypot(*(run.poses[-1, :2] - walk[-1])) < 0.3)
+    (True, 0, True)
     """
     check_choice("control", control, CONTROL_LAWS)
     if not (timeout > 0 and localise_within > 0):
@@ -184,15 +206,13 @@ def perform(
 
 
 class Search:
-    """What a robot does that does not know where it is: turn on the spot, and first move off what
-    it touches.
-    """
+    """What a lost robot does: turn on the spot, and before that move off what it touches."""
 
     def __init__(self, period):
         self.period, self.speed, self.pushed, self.off = period, -BACK_OFF, 0.0, HELD
 
     def command(self, touching):
-        """v in m/s and omega in rad/s."""
+        """v in m/s and omega in rad/s, by whether the robot touches something."""
         if touching:
             self.off, self.pushed = 0.0, self.pushed + self.period
             if self.pushed > PUSHED:
@@ -206,8 +226,9 @@ class Search:
 
 
 def drive(supervisor, robot, kidnap, timeout, localise_within):
-    """The control loop: a record (pose, true pose, segment, localised, touching) per period, and
-    why it gave up.
+    """The control loop: what was the case in each period, and why it gave up, or nothing.
+
+    A record is (pose, true pose, segment, localised, touching).
     """
     records, blind, search = [], 0.0, Search(robot.period)
     while True:

@@ -67,7 +67,7 @@ def test_unchanged_where_nothing_is_near(place, angle):
 @given(places, angles)
 def test_unchanged_when_leaving(place, angle):
     """A direction away from the obstacle is not touched."""
-    _, nx, ny = BOX.edge_and_slope(*place)
+    _, nx, ny = BOX._edge_and_slope(*place)
     ux, uy = unit(angle)
     if nx * ux + ny * uy >= 0:
         assert BOX.modulate(*place, ux, uy) == (ux, uy)
@@ -76,7 +76,7 @@ def test_unchanged_when_leaving(place, angle):
 @given(places, angles)
 def test_modulation_is_the_formula(place, angle):
     """Within the influence: (1 - 1/Gamma) along the normal, (1 + 1/Gamma) along the tangent, brought to unit length."""
-    edge, nx, ny = BOX.edge_and_slope(*place)
+    edge, nx, ny = BOX._edge_and_slope(*place)
     n, u = np.array([nx, ny]) / max(np.hypot(nx, ny), 1e-12), np.array(unit(angle))
     if edge < INFLUENCE and n @ u < -1e-6 and np.hypot(nx, ny) > 0.1:
         share = (INFLUENCE - edge) / (INFLUENCE - KEPT)
@@ -88,7 +88,7 @@ def test_modulation_is_the_formula(place, angle):
 @given(places, angles)
 def test_never_towards_what_is_at_the_kept_distance(place, angle):
     """At the kept distance or nearer, the modulated direction, of unit length, does not point into the obstacle."""
-    edge, nx, ny = BOX.edge_and_slope(*place)
+    edge, nx, ny = BOX._edge_and_slope(*place)
     if edge <= KEPT and nx * nx + ny * ny > 0.5:
         ux, uy = BOX.modulate(*place, *unit(angle))
         assert np.hypot(ux, uy) == pytest.approx(1)
@@ -113,7 +113,7 @@ def test_flow_keeps_clear_of_a_convex_obstacle(bearing, offset):
 def test_speed_limit_uses_the_room_there_is(place, theta, deceleration):
     """One period at the limit and then braking takes all the room; with none, it creeps outwards or stands."""
     limit = BOX.speed_limit(*place, theta, deceleration, 0.1)
-    edge, nx, ny = BOX.edge_and_slope(*place)
+    edge, nx, ny = BOX._edge_and_slope(*place)
     if edge > 0.02:
         assert limit * 0.1 + limit**2 / (2 * deceleration) == pytest.approx(edge)
     else:
@@ -132,13 +132,13 @@ def test_geodesic_against_brute_force():
     """The distances are those of relaxing all neighbours until nothing changes."""
     small = OccupancyGrid(np.pad(np.zeros((26, 30)), 1, constant_values=1), (0.0, 0.0), 0.05)
     way = Geodesic(ObstacleMap.of(Environment([[0.5, 0.6, 0.6, 0.7]]), small), (1.1, 0.4))
-    costs = way.obstacles.neighbours.toarray()
+    costs = way.obstacles._neighbours.toarray()
     costs = np.where(costs + costs.T > 0, costs + costs.T, np.inf)
     distances = np.full(len(costs), np.inf)
-    distances[way.goal_cell] = 0.0
+    distances[way._goal_cell] = 0.0
     for _ in range(200):
         distances = np.minimum(distances, (costs + distances).min(axis=1))
-    assert np.array(way.distances) == pytest.approx(distances)
+    assert np.array(way._distances) == pytest.approx(distances)
 
 
 def test_geodesic_leads_out_of_a_trap():

@@ -128,14 +128,14 @@ def test_doubt_and_belief_by_hand(background):
     states = []
     for fit in (0.9, 0.5, 0.5, 0.8, *[0.5] * 3):
         localizer.fit = fit
-        localizer.judge(0.0)
+        localizer._judge(0.0)
         states.append((localizer.localised, localizer.converged))
     assert states == [(True, True), *[(False, True)] * 2, (True, True), *[(False, True)] * 2, (False, False)]
-    assert localizer.usual_fit == pytest.approx(0.99 * (0.99 * 0.8 + 0.01 * 0.9) + 0.01 * 0.8)
+    assert localizer._usual_fit == pytest.approx(0.99 * (0.99 * 0.8 + 0.01 * 0.9) + 0.01 * 0.8)
     localizer.particles, localizer.spread, localizer.fit = np.zeros((5, 3)), np.ones(2), 0.9
     for _ in range(2):
-        localizer.judge(1.02 * np.pi)
-    assert localizer.particles is None and localizer.turned == 0 and not localizer.converged
+        localizer._judge(1.02 * np.pi)
+    assert localizer.particles is None and localizer._turned == 0 and not localizer.converged
 
 
 def test_a_strange_room_is_never_believed(background):
@@ -234,14 +234,14 @@ def test_resampling_keeps_shares_and_a_robot_that_stands_keeps_its_particles(bac
     localizer.update((0.0, 0.0, 0.0), scan(START, ROOM))
     assert localizer.particles is particles
     localizer.particles, weights = np.arange(5.0)[:, None] * np.ones(3), np.array([0.1, 0.0, 0.5, 0.15, 0.25])
-    drawn = np.bincount(localizer.resampled(weights)[:, 0].astype(int), minlength=5)
+    drawn = np.bincount(localizer._resampled(weights)[:, 0].astype(int), minlength=5)
     assert drawn.sum() == TRACKING and np.abs(drawn - TRACKING * weights).max() <= 1
 
 
 def test_the_laser_is_ahead_of_the_robot(background):
     """Beams end farther ahead by the laser's offset, in the robot's frame."""
     here, ahead = (
-        MonteCarloLocalizer(background, ANGLES, laser_offset=x).beam_ends(np.full(181, 2.0)) for x in (0, 0.3)
+        MonteCarloLocalizer(background, ANGLES, laser_offset=x)._beam_ends(np.full(181, 2.0)) for x in (0, 0.3)
     )
     np.testing.assert_allclose(ahead - here, np.tile([0.3, 0.0], (len(here), 1)))
     np.testing.assert_allclose(here[[0, 30, 60]], [[0, -2], [2, 0], [0, 2]], atol=1e-12)
