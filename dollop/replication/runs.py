@@ -1,5 +1,6 @@
 """Measures of a robot's runs, and places to start them from."""
 
+from itertools import pairwise
 from math import isfinite
 
 import numpy as np
@@ -16,13 +17,15 @@ HELD = 1.0
 def free_poses(count, obstacles, goal, seed, room=0.05):
     """Poses anywhere on a map from which a robot can go to a goal, for starts and kidnappings.
 
+    A reconstruction: the paper does not tell how it chose where to put its robot.
+
     Parameters
     ----------
     count : int
     obstacles : ObstacleMap
     goal : (2,) sequence of float
-        m.
-    seed : int or Generator
+        In m.
+    seed : int or numpy.random.Generator
     room : float
         Least distance in m between the robot's edge and any obstacle.
 
@@ -33,7 +36,8 @@ def free_poses(count, obstacles, goal, seed, room=0.05):
     """
     rng, reachable = np.random.default_rng(seed), Geodesic(obstacles, goal)
     low = np.append(obstacles.origin, -np.pi)
-    high = np.append(low[:2] + obstacles.resolution * np.array(obstacles.distances.shape[::-1]), np.pi)
+    size = obstacles.resolution * np.array(obstacles.distances.shape[::-1])
+    high = np.append(low[:2] + size, np.pi)
     poses = []
     while len(poses) < count:
         x, y, theta = rng.uniform(low, high)
@@ -43,34 +47,42 @@ def free_poses(count, obstacles, goal, seed, room=0.05):
 
 
 def distances_to_law(run, law):
-    """Distance in m of every true pose of a run to the law's response from where the run started:
-    (N,).
+    """How far a robot was from the law's response from where it started (Fig. 7a).
+
+    Parameters
+    ----------
+    run : Run
+    law : SequencedLDS
+
+    Returns
+    -------
+    (N,) float array
+        Distance of every true pose in m.
     """
     positions = run.true_poses[:, :2]
     return distance_to_polyline(positions, law.response(positions[0]))
 
 
 def return_times(run, law, within=0.10):
-    """Time in s from each kidnapping until the robot is back on the response from its start, and
-    keeps to it.
+    """How soon after each kidnapping the robot is back on the response, and keeps to it (Fig. 7b).
 
     Parameters
     ----------
     run : Run
     law : SequencedLDS
     within : float
-        Back is within so many m, for one second.
+        Back is within so many m of the response from its start, for one second.
 
     Returns
     -------
     (M,) float array
-        `inf` where it was kidnapped again, or the run ended, before.
+        In s; `inf` where it was kidnapped again, or the run ended, before.
     """
-    near = np.append(distances_to_law(run, law) <= within, False)
-    away = np.flatnonzero(~near)
+    away = np.flatnonzero(np.append(distances_to_law(run, law) > within, True))
     rows = np.arange(len(run.t))
-    leaves = away[np.searchsorted(away, rows)]  # the row in which the robot, if it is near, no longer is
-    back = (leaves - rows) * np.diff(run.t[:2], prepend=0)[-1] >= HELD
-    ends = np.append(run.kidnapped[1:], np.inf)
-    spans = [back & (run.t >= start) & (run.t < end) for start, end in zip(run.kidnapped, ends, strict=True)]
-    return np.array([run.t[s.argmax()] - t if s.any() else np.inf for s, t in zip(spans, run.kidnapped, strict=True)])
+    leaves = away[np.searchsorted(away, rows)]  # the row in which a robot that is near no longer is
+    back = run.t[(leaves - rows) * np.diff(run.t[:2], prepend=0)[-1] >= HELD]
+    times = []
+    for start, end in pairwise([*run.kidnapped, np.inf]):
+        times.append(back[(back >= start) & (back < end)].min(initial=np.inf) - start)
+    return np.array(times)

@@ -60,3 +60,8 @@ def test_free_poses_are_free_and_everywhere(task):
     assert np.ptp(poses[:, 0]) > 6.5 and np.ptp(poses[:, 1]) > 4.5
     divided = ObstacleMap.of(Environment([[5.4, 0.0, 5.6, 7.0]]), background)
     assert free_poses(50, divided, (2.0, 2.0), seed=0)[:, 0].max() < 5.4
+
+
+def test_a_run_without_a_kidnapping_has_no_time_of_return(task):
+    """Nobody carried it off: there is nothing to come back from."""
+    assert return_times(perform(task, Unicycle(START)), task.law).shape == (0,)
