@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dollop.checks import check_positive
-from dollop.formats.files import FormatError, forgive, longest_rise, read_bytes, usable_clock, whole_file
+from dollop.formats.files import FormatError, read_bytes, whole_file
+from dollop.formats.scans import forgive, longest_rise, usable_clock
 from dollop.laser import LaserLog
 from dollop.pose import wrapped
 
@@ -143,14 +144,14 @@ def read_log(path, max_range=None):
     ------
     FormatError
         If the file is no CARMEN log, holds no scan, or more than a few scans are broken
-        (`dollop.formats.files.forgive`).
+        (`dollop.formats.scans.forgive`).
     ValueError
         If `max_range` is not positive and finite.
 
     Warns
     -----
     UserWarning
-        If broken scans were left out, if the clock is wrong (`dollop.formats.files.usable_clock`),
+        If broken scans were left out, if the clock is wrong (`dollop.formats.scans.usable_clock`),
         or if so many readings of FLASER messages equal the largest one that it may be a full scale
         that is not known here.
     """

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dollop.formats.files import FormatError, forgive, usable_clock
+from dollop.formats.files import FormatError
+from dollop.formats.scans import forgive, usable_clock
 from dollop.laser import LaserLog
 
 __all__ = ["read_log"]
@@ -48,7 +49,7 @@ def read_log(path, topic=None):
     Warns
     -----
     UserWarning
-        If broken scans were left out, if the clock is wrong (`dollop.formats.files.usable_clock`),
+        If broken scans were left out, if the clock is wrong (`dollop.formats.scans.usable_clock`),
         or if the bag holds odometry or moving transforms (`/tf`), so that the robot may have moved.
     """
     try:

@@ -1,26 +1,14 @@
-"""Files at the edge: reading safely, forgiving little, writing whole or not at all."""
+"""Files at the edge: reading safely, writing whole or not at all."""
 
 import codecs
 import errno
 import gzip
-import warnings
-from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from dollop.formats import files
-from dollop.formats.files import (
-    FormatError,
-    check_writable,
-    forgive,
-    longest_rise,
-    read_bytes,
-    usable_clock,
-    whole_file,
-)
+from dollop.formats.files import FormatError, check_writable, read_bytes, whole_file
 
 
 def test_error_names_file_and_line():
@@ -99,93 +87,6 @@ def test_unreadable_files_are_refused(tmp_path, monkeypatch):
         (tmp_path / "f").write_bytes(content)
         with pytest.raises(FormatError, match=message):
             read_bytes(tmp_path / "f")
-
-
-@given(st.lists(st.integers(0, 5), max_size=8))
-def test_longest_rise_is_as_long_as_brute_force(values):
-    """The chosen values increase, and no longer choice does."""
-    chosen = longest_rise(values)
-    picked = [values[i] for i in chosen]
-    assert all(a < b for a, b in zip(picked, picked[1:], strict=False))
-    rises = (
-        len(c)
-        for n in range(len(values) + 1)
-        for c in combinations(values, n)
-        if all(a < b for a, b in zip(c, c[1:], strict=False))
-    )
-    assert len(chosen) == max(rises)
-
-
-def test_one_broken_scan_in_a_long_log_is_forgiven():
-    """One of 20, or three of 300, are left out with a single warning that counts them and names the first line."""
-    with pytest.warns(UserWarning, match="left out 1 broken of 20 scans, the first on line 3: odd") as record:
-        forgive("a.log", [(3, "odd")], 20)
-    assert len(record) == 1
-    with pytest.warns(UserWarning, match="left out 3 broken of 300"):
-        forgive("a.log", [(3, "odd"), (5, "odd"), (9, "odd")], 300)
-
-
-@pytest.mark.parametrize(("bad", "total"), [(1, 19), (2, 100), (4, 300), (50, 100)])
-def test_many_broken_scans_are_not_forgiven(bad, total):
-    """More than one scan in a hundred, or any in a short log, is an error with the first broken line."""
-    with pytest.raises(FormatError, match=rf"a.log, line 3: odd \({bad} of {total}"):
-        forgive("a.log", [(3 + i, "odd") for i in range(bad)], total)
-
-
-def test_a_good_clock_is_left_alone():
-    """An increasing clock loses nothing, changes nothing and warns of nothing."""
-    t = np.array([5.0, 5.1, 5.3])
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        keep, kept = usable_clock("a.log", t)
-    assert keep.tolist() == [0, 1, 2] and np.array_equal(kept, t)
-
-
-def test_a_stray_time_costs_one_scan():
-    """One time far in the future near the beginning takes only itself away."""
-    t = np.arange(100) * 0.1
-    t[3] = 1e9
-    with pytest.warns(UserWarning, match="left out 1 of 100 scans"):
-        keep, kept = usable_clock("a.log", t)
-    assert len(keep) == 99 and 3 not in keep and np.all(np.diff(kept) > 0)
-
-
-@pytest.mark.parametrize(("stray", "time"), [(99, 1e300), (0, -1e6), (50, 1e6), (50, -1e6)])
-def test_a_scan_far_from_both_neighbours_is_left_out(stray, time):
-    """Forwards or backwards, within the log or at its end: one such scan takes only itself away."""
-    t = np.arange(100) * 0.1
-    t[stray] = time
-    with pytest.warns(UserWarning, match="left out 1 of 100 scans, which the clock puts out of order") as record:
-        keep, kept = usable_clock("a.log", t)
-    assert keep.tolist() == [i for i in range(100) if i != stray] and np.array_equal(kept, t[keep])
-    assert len(record) == 1
-
-
-def test_a_lasting_jump_is_told():
-    """A clock that is set forwards for good leaves every scan in order, with a warning of the jump."""
-    t = np.arange(100) * 0.1 + 1e6 * (np.arange(100) >= 50)
-    with pytest.warns(UserWarning, match="the clock jumps by 1e.06 s") as record:
-        keep, kept = usable_clock("a.log", t)
-    assert len(keep) == 100 and np.array_equal(kept, t) and len(record) == 1
-
-
-@pytest.mark.parametrize("t", [np.zeros(50), -np.arange(50.0), np.tile(np.arange(25.0), 2)])
-def test_a_useless_clock_is_replaced_and_said_so(t):
-    """All zero, running backwards or reset in the middle: every scan is kept, at the nominal rate, with a warning."""
-    with pytest.warns(UserWarning, match="timed at 10 Hz; speeds mean nothing"):
-        keep, kept = usable_clock("a.log", t)
-    assert len(keep) == 50
-    np.testing.assert_allclose(kept, np.arange(50) * 0.1)
-
-
-@pytest.mark.parametrize(("scans", "kept"), [(20, 19), (19, 19)])
-def test_one_scan_in_twenty_may_be_out_of_order(scans, kept):
-    """Exactly one in twenty is left out and the times stay; one in nineteen makes the clock worthless."""
-    t = 5 + np.arange(scans) * 0.5
-    t[3] = 1e9
-    with pytest.warns(UserWarning):
-        keep, times = usable_clock("a.log", t)
-    assert len(keep) == kept and times[-1] == (t[-1] if scans == 20 else 1.8)
 
 
 def test_written_files_can_be_read_by_others(tmp_path):
