@@ -1,5 +1,4 @@
-"""The study behind REPLICATION.md: every claim's experiment over many seeds, on all cores or on a
-Dask cluster.
+"""The study behind REPLICATION.md: every claim over many seeds, on all cores or a Dask cluster.
 
 Results go into one tidy table, study/results.csv: a row per claim, seed and number. It is replaced
 whole after every seed that is done, so that an interrupted study goes on where it was. From the
@@ -9,7 +8,6 @@ the numbers of one seed that any machine must find again.
 
 import json
 import sys
-import tempfile
 from contextlib import contextmanager, nullcontext
 from math import isfinite, nan
 from pathlib import Path
@@ -20,8 +18,11 @@ import pandas as pd
 from scipy import stats
 from tqdm import tqdm
 
-from dollop.formats.files import FormatError, whole_file
+from dollop.extras import need
+from dollop.formats.files import FormatError, check_writable, whole_file
 from dollop.replication.claims import CLAIMS
+
+__all__ = ["command"]
 
 COLUMNS = ["claim", "seed", "number", "value"]
 SEEDS, QUICK_SEEDS = 100, 3
@@ -106,35 +107,40 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
     """
     table, failures, deaths = read_table(table_path), [], 0
     todo = missing(table, claims, ids, seeds)
-    with tqdm(total=len(todo), desc="study", unit="seed", file=sys.stderr) as bar, workers(scheduler, jobs) as done:
+    bar = tqdm(total=len(todo), desc="study", unit="seed", file=sys.stderr)
+    with bar, workers(scheduler, jobs) as done:
         while todo:
             try:
-                for seed, rows, failed in done([joblib.delayed(work)(*job, claims) for job in todo.items()]):
-                    table = pd.concat([table, as_table(rows)]).drop_duplicates(COLUMNS[:3], keep="last")
+                calls = [joblib.delayed(work)(*job, claims) for job in todo.items()]
+                for seed, rows, failed in done(calls):
+                    table = pd.concat([table, as_table(rows)])
+                    table = table.drop_duplicates(COLUMNS[:3], keep="last")
                     write_table(table, table_path)
-                    failures += failed
-                    deaths = 0
+                    failures, deaths = failures + failed, 0
                     del todo[seed]
                     bar.update()
             except Exception as error:
-                if not a_worker_died(error):
-                    raise
                 deaths += 1
-                tqdm.write(f"a worker died ({type(error).__name__}); trying {len(todo)} seeds again", sys.stderr)
-                if deaths == ATTEMPTS:
-                    raise RuntimeError(
-                        f"workers died {ATTEMPTS} times in a row over the seeds {list(todo)}; what was done is kept"
-                    ) from error
+                give_up_or_tell(error, deaths, todo)
     if failures:
         raise RuntimeError(f"{len(failures)} experiments failed: {'; '.join(failures)}")
     return table
 
 
+def give_up_or_tell(error, deaths, todo):
+    """Raise what is no worker's death, or one death too many; tell of any other."""
+    kinds = {kind.__name__ for kind in type(error).__mro__}
+    if kinds.isdisjoint(("BrokenProcessPool", "KilledWorker", "TimeoutError")):
+        raise error
+    tqdm.write(f"a worker died ({type(error).__name__}); {len(todo)} seeds are left", sys.stderr)
+    if deaths == ATTEMPTS:
+        told = f"workers died {ATTEMPTS} times in a row over the seeds {list(todo)}"
+        raise RuntimeError(f"{told}; what was done is kept") from error
+
+
 @contextmanager
 def workers(scheduler=None, jobs=-1):
-    """What runs jobs and yields their results as they come: processes here, or those of a Dask
-    cluster.
-    """
+    """What runs calls and yields results as they come: processes here, or on a Dask cluster."""
     with dask_backend(scheduler) if scheduler else nullcontext():
         patience = PATIENCE if scheduler else None
         yield joblib.Parallel(jobs, return_as="generator_unordered", batch_size=1, timeout=patience)
@@ -143,27 +149,22 @@ def workers(scheduler=None, jobs=-1):
 @contextmanager
 def dask_backend(scheduler):
     """joblib on the Dask cluster at an address."""
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise ImportError(f"a Dask cluster needs the extra cluster: pip install dollop[cluster] ({error})") from error
+    need("cluster")
+    from distributed import Client
+
     with Client(scheduler), joblib.parallel_config("dask"):
         yield
 
 
-def a_worker_died(error):
-    """Whether it is the worker that failed, not the experiment."""
-    return any(kind.__name__ in ("BrokenProcessPool", "KilledWorker", "TimeoutError") for kind in type(error).__mro__)
-
-
 def missing(table, claims, ids, seeds):
-    """The claims that each seed still lacks a number of, {seed: list of ids}, in the order given."""
+    """The claims that a seed still lacks a number of, {seed: list of ids}, in the order given."""
     done = set(zip(table.claim, table.seed, table.number, strict=True))
-    lacking = {
-        seed: [id for id in ids if any((id, seed, each.number) not in done for each in claims[id].criteria)]
-        for seed in seeds
-    }
-    return {seed: ids for seed, ids in lacking.items() if ids}
+    todo = {}
+    for seed in seeds:
+        for id in ids:
+            if any((id, seed, each.number) not in done for each in claims[id].criteria):
+                todo.setdefault(seed, []).append(id)
+    return todo
 
 
 def as_table(rows=()):
@@ -208,14 +209,21 @@ def interval(values, share=False, level=0.95):
     >>> f"{mean:.2f} [{low:.2f}, {high:.2f}]"
     '0.90 [0.60, 0.98]'
     """
-    values = np.asarray(values, float)
-    if not len(values):
+    values, n = np.asarray(values, float), len(values)
+    if not n:
         return nan, nan, nan
+    mean = values.mean()
     if share:
-        ends = stats.binomtest(int(values.sum()), len(values)).proportion_ci(level, "wilson")
-        return values.mean(), ends.low, ends.high
-    reach = stats.sem(values) * stats.t.ppf((1 + level) / 2, len(values) - 1) if len(values) > 1 else np.inf
-    return values.mean(), values.mean() - reach, values.mean() + reach
+        ends = stats.binomtest(int(values.sum()), n).proportion_ci(level, "wilson")
+        return mean, ends.low, ends.high
+    reach = stats.sem(values) * stats.t.ppf((1 + level) / 2, n - 1) if n > 1 else np.inf
+    return mean, mean - reach, mean + reach
+
+
+def summaries(table):
+    """Summaries of all claims in the table, in the paper's order."""
+    by_claim = dict(iter(table.groupby("claim")))
+    return [summary(claim, by_claim[id]) for id, claim in CLAIMS.items() if id in by_claim]
 
 
 def summary(claim, rows):
@@ -227,7 +235,8 @@ def summary(claim, rows):
     rows : pandas.DataFrame
         Of the table, those of this claim.
     """
-    numbers = [measured(each, rows.value[rows.number == each.number].dropna()) for each in claim.criteria]
+    values = [rows.value[rows.number == each.number].dropna() for each in claim.criteria]
+    numbers = [measured(*each) for each in zip(claim.criteria, values, strict=True)]
     return {
         "id": claim.id,
         "section": claim.section,
@@ -248,70 +257,43 @@ def measured(criterion, values):
         "number": criterion.number,
         "meaning": criterion.meaning,
         "mean": short(mean),
-        "sd": short(np.std(values, ddof=1)) if len(values) > 1 else None,
+        "sd": short(np.std(values, ddof=1) if len(values) > 1 else nan),
         "low": short(low),
         "high": short(high),
         "seeds": len(values),
-        "wanted": wanted and closed(wanted),
+        "wanted": wanted and [end if isfinite(end) else None for end in wanted],
         "met": wanted and met(low, high, wanted),
     }
 
 
 def short(value):
-    """A number to four significant digits, None for nan."""
+    """A number to four significant digits, None for what is no number."""
     return float(f"{value:.4g}") if isfinite(value) else None
 
 
-def closed(range_):
-    """A range for JSON, which knows no infinity."""
-    return [end if isfinite(end) else None for end in range_]
-
-
 def met(low, high, wanted):
-    """Whether an interval lies in what is wanted: "yes", "no" if it lies wholly beside it, else
-    "open".
-    """
+    """Whether an interval lies in what is wanted: "yes", "no" if wholly beside it, else "open"."""
     if wanted[0] < low and high <= wanted[1]:
         return "yes"
     return "no" if high <= wanted[0] or low > wanted[1] else "open"
 
 
 def verdict(answers):
-    """The rule: it holds if every criterion is met, and does not if none is and one is clearly not;
-    else in part.
-    """
+    """The rule: it holds if all are met, not if none is and one is clearly not, else in part."""
     if all(answer == "yes" for answer in answers):
         return "holds"
     return "does not hold" if "no" in answers and "yes" not in answers else "holds in part"
 
 
-def summaries(table):
-    """Summaries of all claims in the table, in the paper's order."""
-    return [summary(claim, table[table.claim == id]) for id, claim in CLAIMS.items() if (table.claim == id).any()]
-
-
-def claims_table(found):
-    """The claims as a Markdown table: the words, the numbers with 95 % intervals, what is wanted,
-    the verdict.
-    """
-    lines = ["| claim | Sec. | the paper's words | number: mean [95 % interval] | wanted | verdict |", "|" + "---|" * 6]
-    for claim in found:
-        numbers = "<br>".join(f"{n['meaning']}: {amount(n)}" for n in claim["numbers"])
-        wanted = "<br>".join(wish(n["wanted"]) for n in claim["numbers"])
-        quote = f"“{claim['quote']}”"
-        verdict = f"**{claim['verdict']}**" + (", by construction" if claim["by_construction"] else "")
-        lines.append(f"| `{claim['id']}` | {claim['section']} | {quote} | {numbers} | {wanted} | {verdict} |")
-    return "\n".join(lines)
-
-
 def golden_numbers(table):
-    """The numbers of the golden seed but for times, each with its tolerance, by claim and number."""
+    """The golden seed's numbers but for times, each with its tolerance, by claim and number."""
     values = table.pivot(index=["claim", "number"], columns="seed", values="value")
     numbers = {}
     for id, claim in CLAIMS.items():
         for each in claim.criteria:
-            if (id, each.number) in values.index and not each.timed:
-                numbers.setdefault(id, {})[each.number] = golden(values.loc[(id, each.number)])
+            key = (id, each.number)
+            if key in values.index and not each.timed:
+                numbers.setdefault(id, {})[each.number] = golden(values.loc[key])
     return {"parameters": GOLDEN, "numbers": numbers}
 
 
@@ -320,10 +302,28 @@ def golden(values):
 
     The floor is for numbers without spread, and for the six digits that the table keeps.
     """
-    value, spread = values[GOLDEN["seed"]], values.std()
-    floor = 1e-9 + 1e-6 * abs(value)
-    tolerance = np.nanmax([floor, GOLDEN["tolerance"] * spread, 1e-9])
+    value = values[GOLDEN["seed"]]
+    floor = 1e-9 + 1e-6 * np.nan_to_num(abs(value))
+    tolerance = max(floor, np.nan_to_num(GOLDEN["tolerance"] * values.std()))
     return {"value": float(value) if isfinite(value) else None, "tolerance": short(tolerance)}
+
+
+# ---- telling
+
+
+def claims_table(found):
+    """The claims as a Markdown table: words, numbers with intervals, what is wanted, verdict."""
+    head = "| claim | Sec. | the paper's words | number: mean [95 % interval] | wanted | verdict |"
+    return "\n".join([head, "|" + "---|" * 6, *map(table_row, found)])
+
+
+def table_row(claim):
+    """One claim as a row of the Markdown table."""
+    numbers = "<br>".join(f"{n['meaning']}: {amount(n)}" for n in claim["numbers"])
+    wanted = "<br>".join(wish(n["wanted"]) for n in claim["numbers"])
+    verdict = f"**{claim['verdict']}**" + (", by construction" if claim["by_construction"] else "")
+    quote = f"“{claim['quote']}”"
+    return f"| `{claim['id']}` | {claim['section']} | {quote} | {numbers} | {wanted} | {verdict} |"
 
 
 def amount(number):
@@ -354,58 +354,61 @@ def put_between_marks(text, content):
 # ---- the command
 
 
-def add_arguments(parser):
-    """Arguments of `dollop study`."""
-    parser.add_argument("ids", nargs="*", metavar="claim", help=f"any of {', '.join(CLAIMS)}; all when none is given")
-    parser.add_argument("--seeds", type=int, help=f"how many seeds (default: {SEEDS})")
-    parser.add_argument("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds, for a look")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler to work on, such as tcp://host:8786")
-    parser.add_argument("--folder", type=Path, help="where the table goes (default: study; study-quick when quick)")
-    parser.set_defaults(run=command)
-
-
 def command(options):
-    """dollop study [CLAIM ...]"""
+    """Run the study that the command line asks for, and write what follows from it.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        ids (all claims if empty), seeds (None for the usual number), quick, folder (None for the
+        usual one), scheduler.
+
+    Raises
+    ------
+    ValueError
+        If a claim is unknown, there are too few seeds, or experiments failed.
+    ImportError
+        If an extra is missing that the experiments need.
+    OSError
+        If the folder cannot be written to.
+    """
     unknown = [id for id in options.ids if id not in CLAIMS]
     if unknown:
         raise ValueError(f"no claim {', '.join(unknown)}; known: {', '.join(CLAIMS)}")
     seeds = (QUICK_SEEDS if options.quick else SEEDS) if options.seeds is None else options.seeds
     if seeds < 2:
         raise ValueError(f"an interval needs at least 2 seeds, got {seeds}")
+    need("lab")
     folder = options.folder or Path("study-quick" if options.quick else "study")
-    check_writable(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "results.csv"
+    check_writable(path)
     try:
-        table = run_study(options.ids or list(CLAIMS), range(seeds), folder / "results.csv", options.scheduler)
+        table = run_study(options.ids or list(CLAIMS), range(seeds), path, options.scheduler)
     except RuntimeError as error:
         raise ValueError(f"{error}. Run the same command again to go on") from error
     except KeyboardInterrupt:
-        sys.exit(f"dollop: stopped; what was done is in {folder / 'results.csv'}, the same command goes on from there")
-    found = summaries(table)
-    report(found, table, folder)
+        sys.exit(f"dollop: stopped; what was done is in {path}, the same command goes on there")
+    publish(table, folder)
 
 
-def check_writable(folder):
-    """Raise OSError now if the folder cannot be written to later."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError as error:
-        raise OSError(f"the folder {folder} cannot be written to: {error}") from error
+def report_beside(folder):
+    """REPLICATION.md if the folder is that of the replication's own study beside it, else None."""
+    path = folder.parent / "REPLICATION.md"
+    return path if folder.name == "study" and path.exists() else None
 
 
-def report(found, table, folder):
-    """Write claims.json: into a quick study's folder, or beside REPLICATION.md, whose table of
-    claims it then is.
+def publish(table, folder):
+    """Write claims.json into the folder; beside REPLICATION.md if the study is the one told there.
 
-    Beside REPLICATION.md, the golden numbers are written as well.
+    Its table of claims and the golden numbers are then written as well.
     """
+    found, report = summaries(table), report_beside(folder)
     for claim in found:
         print(f"{claim['id']:17}{claim['verdict']:15}{claim['seeds']:4} seeds")
-    replication = folder.parent / "REPLICATION.md"
-    full = folder.name == "study" and replication.exists()
-    written = {(folder.parent if full else folder) / "claims.json": as_json(found)}
-    if full:
-        written[replication] = put_between_marks(replication.read_text(), claims_table(found))
+    written = {(folder.parent if report else folder) / "claims.json": as_json(found)}
+    if report:
+        written[report] = put_between_marks(report.read_text(), claims_table(found))
         written[folder / "golden.json"] = as_json(golden_numbers(table))
     for path, text in written.items():
         with whole_file(path, "w") as stream:

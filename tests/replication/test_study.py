@@ -1,17 +1,28 @@
-"""The study: resumed, retried, spread over a cluster, summed up by rule; and the experiments' own measures."""
+"""The study: resumed, retried, on a cluster, summed up by rule; and the experiments' measures."""
 
 import json
 import os
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from dollop.cli import main
+from dollop.extras import EXTRAS
 from dollop.formats.files import FormatError
 from dollop.replication import study
-from dollop.replication.claims import Claim, Criterion, environment, law, learning, measures, observing, robot
+from dollop.replication.claims import (
+    Claim,
+    Criterion,
+    environment,
+    law,
+    learning,
+    measures,
+    observing,
+    robot,
+)
 
 
 def claim_of(experiment):
@@ -31,7 +42,7 @@ def counting(folder):
 
 
 def dying(folder, always=False):
-    """An experiment whose worker dies at seed 1, the first time or always; never the process of the test."""
+    """An experiment whose worker dies at seed 1, once or always; never the test's own process."""
     here = os.getpid()
 
     def experiment(seed):
@@ -71,11 +82,12 @@ def test_a_study_goes_on_where_it_was(tmp_path, runs):
     both = study.run_study(["fake"], range(4), table, claims=counting(runs), jobs=2)
     assert sorted(path.name for path in runs.iterdir()) == ["0-0", "1-0", "2-0", "3-0"]
     assert sorted(both.seed) == [0, 1, 2, 3]
-    assert both[both.seed < 2].sort_values("seed").value.tolist() == first.sort_values("seed").value.tolist()
+    old, kept = (table.sort_values("seed").value.tolist() for table in (first, both[both.seed < 2]))
+    assert kept == old
 
 
 def test_a_number_that_is_new_is_filled_in(tmp_path, runs):
-    """A claim that has got another criterion is run again for it, and no number stands twice in the table."""
+    """A claim with another criterion is run again for it, and no number stands twice."""
     claim = counting(runs)["fake"]
     study.run_study(["fake"], [0], tmp_path / "results.csv", claims={"fake": claim}, jobs=1)
     more = replace(claim, criteria=(*claim.criteria, replace(claim.criteria[0], number="other")))
@@ -105,18 +117,20 @@ def test_an_interrupted_study_loses_nothing(tmp_path, runs, monkeypatch):
 
 
 def test_a_failed_experiment_is_named_and_run_again(tmp_path, runs):
-    """The others are kept, the message names claim, seed and reason, and the next call runs that seed alone."""
+    """The others are kept, claim, seed and reason are named, the next call runs that seed alone."""
     table, stumble = tmp_path / "results.csv", stumbling(runs)
     with pytest.raises(RuntimeError, match="claim fake, seed 1: ValueError: a stone"):
         study.run_study(["fake"], range(3), table, claims=stumble, jobs=1)
     assert sorted(study.read_table(table).seed) == [0, 2]
-    assert sorted(study.run_study(["fake"], range(3), table, claims=stumble, jobs=1).seed) == [0, 1, 2]
+    again = study.run_study(["fake"], range(3), table, claims=stumble, jobs=1)
+    assert sorted(again.seed) == [0, 1, 2]
     assert not list(runs.glob("*-1"))
 
 
 def test_a_worker_that_dies_is_retried_and_reported(tmp_path, runs, capsys):
     """The study finishes, and says that a worker died."""
-    table = study.run_study(["fake"], range(4), tmp_path / "results.csv", claims=dying(runs), jobs=2)
+    path = tmp_path / "results.csv"
+    table = study.run_study(["fake"], range(4), path, claims=dying(runs), jobs=2)
     assert sorted(table.seed) == [0, 1, 2, 3] and (table.seed == table.value).all()
     assert "a worker died" in capsys.readouterr().err
 
@@ -130,28 +144,35 @@ def test_workers_that_keep_dying_end_the_study(tmp_path, runs):
     assert study.read_table(path).seed.tolist() == [0]
 
 
+def cluster_of_two(distributed):
+    """A Dask cluster of two workers on this machine."""
+    return distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
+
+
 def test_a_dask_cluster_gives_the_same_numbers(tmp_path):
     """Naming a scheduler moves the work there and changes nothing else."""
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
     tables = []
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+    with cluster_of_two(distributed) as cluster:
         for name, scheduler in (("here", None), ("there", cluster.scheduler_address)):
-            tables.append(study.run_study(["combined"], range(3), tmp_path / name, scheduler, jobs=1))
+            path = tmp_path / name
+            tables.append(study.run_study(["combined"], range(3), path, scheduler, jobs=1))
     here, there = (table.sort_values(["seed", "number"]).reset_index(drop=True) for table in tables)
     pd.testing.assert_frame_equal(here, there)
 
 
 def test_a_dask_worker_that_dies_for_good_ends_the_study(tmp_path, runs, monkeypatch, capsys):
-    """The study does not wait for ever for what a cluster has given up; the other seeds are kept."""
+    """The study does not wait for what a cluster has given up; the other seeds are kept."""
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
     monkeypatch.setattr(study, "PATIENCE", 3.0)
     monkeypatch.setattr(study, "ATTEMPTS", 1)
     path = tmp_path / "results.csv"
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        cluster_of_two(distributed) as cluster,
         pytest.raises(RuntimeError, match="workers died"),
     ):
-        study.run_study(["fake"], range(4), path, cluster.scheduler_address, dying(runs, always=True))
+        claims = dying(runs, always=True)
+        study.run_study(["fake"], range(4), path, cluster.scheduler_address, claims)
     assert 1 not in study.read_table(path).seed.tolist()
     assert "a worker died" in capsys.readouterr().err
 
@@ -189,7 +210,17 @@ def test_an_unwritable_folder_is_said_before_the_work(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "run_study", lambda *_: pytest.fail("work was begun"))
     with pytest.raises(SystemExit) as end:
         main(["study", "combined", "--folder", str(tmp_path / "taken")])
-    assert "cannot be written to" in str(end.value)
+    assert "taken" in str(end.value)
+
+
+def test_a_missing_laboratory_is_said_before_the_work(tmp_path, monkeypatch):
+    """One line says how to install it, and nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(EXTRAS, "lab", "no_such_module")
+    with pytest.raises(SystemExit) as end:
+        main(["study", "combined"])
+    assert 'pip install "dollop[lab]"' in str(end.value) and "\n" not in str(end.value)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("content", ["", "a,b\n1,2\n", "claim,seed,number,value\nx,one,y,2\n"])
@@ -203,7 +234,7 @@ def test_a_table_of_something_else_is_refused(content, tmp_path):
 
 
 def test_intervals_cover_the_truth():
-    """Of 1000 intervals of twenty values 93 to 98 % hold the true mean, for numbers and for shares."""
+    """Of 1000 intervals of twenty values 93 to 98 % hold the true mean, of shares too."""
     rng = np.random.default_rng(0)
     for drawn, truth, share in (
         (rng.normal(3.0, 1.0, (1000, 20)), 3.0, False),
@@ -230,7 +261,7 @@ def test_the_verdict_follows_the_rule(answers, words):
 
 
 def test_a_criterion_is_met_only_by_the_whole_interval():
-    """A mean above zero whose interval reaches below it leaves it open; no number at all does too."""
+    """A mean above zero whose interval reaches below leaves it open; no number at all does too."""
     criterion = Criterion("number", "a number", (0, np.inf))
     for values, answer in (
         ([1.0, 1.1, 0.9], "yes"),
@@ -263,7 +294,7 @@ def test_windings_count_turns():
 
 
 def test_predictions_of_a_straight_walk_are_right():
-    """A walker at constant velocity is predicted through a gap, and one who is taken to stand is not."""
+    """A walker at constant velocity is predicted through a gap, one taken to stand is not."""
     t = np.arange(0, 6, 0.1)
     truth = np.column_stack([1.0 * t, 0.5 * t])
     shown = truth.copy()
@@ -287,7 +318,7 @@ def test_hiding_takes_away_one_second_in_four():
 
 @pytest.mark.parametrize("matching", ["greedy", "joint"])
 def test_walkers_far_apart_are_never_switched(matching):
-    """Two walkers on parallel lines keep their tracks; swapped by hand halfway, each counts one switch."""
+    """Two walkers on parallel lines keep their tracks; swapped by hand, each counts one switch."""
     t = np.arange(0, 6.05, 0.1)
     objects = [np.array([[x, 0.0], [x, 4.0]]) for x in t]
     alone = np.tile([0, 1], (len(t), 1))
@@ -333,7 +364,7 @@ def test_speeds_are_told_by_shares_of_the_way():
 
 def test_a_run_counts_until_its_first_collision():
     """Who is back only after having hit something does not count as back."""
-    run = type("Run", (), {"t": np.arange(5) * 0.1, "clearance": np.array([1, 1, -0.1, 1, 1]), "collisions": 1})
+    run = SimpleNamespace(t=np.arange(5) * 0.1, clearance=np.array([1, 1, -0.1, 1, 1]), collisions=1)
     assert robot.first_hit(run) == pytest.approx(0.2)
     run.collisions = 0
     assert robot.first_hit(run) == np.inf
@@ -353,14 +384,16 @@ def test_the_linear_program_finds_the_best_bijection():
     """On random costs it costs what the best of all bijections does, and its shares are whole."""
     costs = np.random.default_rng(5).integers(0, 1000, (6, 6))
     found = environment.assignment_program(costs)
-    assert found.fun == pytest.approx(costs[np.arange(6), environment.bijections(6)].sum(axis=1).min())
+    all_costs = costs[np.arange(6), environment.bijections(6)].sum(axis=1)
+    assert found.fun == pytest.approx(all_costs.min())
     assert np.allclose(found.x, found.x.round())
 
 
 def test_heavy_tails_have_the_told_scale():
-    """Half of the subgoals' errors are within 0.765 scales, as Student's t of three degrees of freedom has it."""
+    """Half of the errors are within 0.765 scales, as Student's t of three degrees has it."""
     truth = np.zeros((6, 2))
-    off = np.concatenate([each[:6] for each in learning.drawn_with_tails(truth, 2000, 1) if len(each) == 6])
+    drawn = learning.drawn_with_tails(truth, 2000, 1)
+    off = np.concatenate([each for each in drawn if len(each) == 6])
     assert np.median(np.abs(off)) == pytest.approx(0.765 * learning.SPREAD, rel=0.03)
 
 
@@ -371,8 +404,9 @@ def test_passing_places_are_in_turn_left_and_right():
 
 
 def test_golden_numbers_are_those_of_one_seed():
-    """Times are left out, nan becomes None, and the tolerance is a share of the spread or the floor."""
-    rows = [("time", 0, "seconds", 0.1), ("loss", 0, "lost_per_lap", np.nan), ("loss", 1, "lost_per_lap", 1.0)]
+    """Times are left out, nan becomes None; tolerances are a share of the spread, or the floor."""
+    rows = [("time", 0, "seconds", 0.1)]
+    rows += [("loss", seed, "lost_per_lap", value) for seed, value in enumerate((np.nan, 1.0))]
     rows += [("scaled", seed, "off_percent", value) for seed, value in enumerate((2.0, 4.0, 6.0))]
     rows += [("parameters", seed, "numbers", 44.0) for seed in range(3)]
     assert study.golden_numbers(study.as_table(rows))["numbers"] == {

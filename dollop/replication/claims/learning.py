@@ -63,7 +63,7 @@ def combined(seed, n=5):
     "the subgoals to be located.",
     Criterion("two_more_than_ten_m", "error from two demonstrations minus that from ten [m]", MORE),
     Criterion("exponent", "exponent in the number of demonstrations (ideal: -0.5)", (-0.7, -0.3)),
-    Criterion("passing_alone_more_m", "walked: from passing places, one slalom minus two [m]", MORE),
+    Criterion("passing_alone_more_m", "walked: off passing places, one slalom minus two [m]", MORE),
     Criterion("error_2_m", "mean error of the subgoals from two demonstrations [m]"),
     Criterion("error_10_m", "from ten [m]"),
     Criterion("half_two_more_than_ten_m", "scatter half as wide: two minus ten [m]"),
