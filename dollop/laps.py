@@ -10,10 +10,12 @@ from dollop.trajectory import arc_length, check_trajectory, resample
 
 __all__ = ["laps"]
 
-REPEATS = 1 / 3  # a track repeats itself if a lap later it is this much closer to itself than two random places are
+# A track repeats itself if a lap later it is this much closer to itself than two random places are.
+REPEATS = 1 / 3
 LAP_SPREAD = 0.15  # share by which one lap may be shorter or longer than the typical one
-BESIDE = 0.05  # a track is on its laps once it has run this share of a lap within a gate's width of the next lap
-GATE_WIDTH = 4.0  # half the width of the gate, as a multiple of the median distance between one lap and the next
+# A track is on its laps once it has run this share of a lap within a gate's width of the next lap.
+BESIDE = 0.05
+GATE_WIDTH = 4.0  # half the gate's width, in median distances between one lap and the next
 GATE_SLACK = 0.02  # share of a lap over which a direction is taken, and that a last lap may lack
 STRAIGHT = 0.5  # a gate needs a direction: distance made good, as a share of the way walked there
 
@@ -46,8 +48,9 @@ def lap_lag(track):
 
 
 def distance_to_next_lap(track, lag):
-    """Distance in m of each place on a track (n, d) to the nearest about lag samples later; as many
-    as there are.
+    """Distance (M,) in m of each place on a track (n, d) to the nearest about lag samples later.
+
+    As many as there are.
     """
     slack = int(LAP_SPREAD * lag)
     here = track[: len(track) - lag - slack]
@@ -61,14 +64,14 @@ def first_run(beside, run):
 
 
 def laps(t, positions):
-    """Cut the laps out of one continuously walked track.
+    """Cut the laps out of one continuously walked track (a reconstruction, see the module).
 
-    The length of a lap comes from where the track repeats itself (`lap_lag`). Ways to and from the
-    laps, which run beside no other lap, are dropped. The gate is a line across the track; a lap
-    begins where the track crosses it in the gate's direction, about one lap after the last time, so
-    that the second visit to a figure-eight's crossing opens no lap. Of all gates on the first lap
-    the one with the most laps is taken, and among those the one that is passed most narrowly. What
-    is left at head and tail is dropped.
+    The length of a lap comes from where the track repeats itself. Ways to and from the laps, which
+    run beside no other lap, are dropped. The gate is a line across the track; a lap begins where
+    the track crosses it in the gate's direction, about one lap after the last time, so that the
+    second visit to a figure-eight's crossing opens no lap. Of all gates on the first lap the one
+    with the most laps is taken, and among those the one that is passed most narrowly. What is left
+    at head and tail is dropped.
 
     Parameters
     ----------
@@ -80,8 +83,8 @@ def laps(t, positions):
     Returns
     -------
     list of (N_k, 2) float arrays
-        The laps in order, all sampled at the track's median period; the whole track if it does not
-        repeat itself.
+        The laps in order, in m, all sampled at the track's median period; the whole track if it
+        does not repeat itself.
 
     Raises
     ------
@@ -105,9 +108,7 @@ def laps(t, positions):
 
 
 def lap_cuts(points):
-    """Samples of a track (N, 2) at which the laps begin, and the one at which the last ends; see
-    `laps`.
-    """
+    """Samples of a track (N, 2) at which laps begin, and where the last ends (see `laps`)."""
     walked, n = arc_length(points), min(max(len(points), 100), 1000)
     track, step = resample(points, n), walked[-1] / (n - 1)
     lag = lap_lag(track)
@@ -122,9 +123,7 @@ def lap_cuts(points):
 
 
 def best_cuts(points, lap, width):
-    """The gate crossings of the gate with the most laps, among those of the one that is passed most
-    narrowly.
-    """
+    """Crossings of the gate with the most laps, among those of the most narrowly passed."""
     walked, end = arc_length(points), len(points) - 1
     best, best_rank = [0, end], (2, -np.inf)
     for gate in np.flatnonzero(walked < lap):

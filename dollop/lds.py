@@ -1,9 +1,11 @@
 """One linear dynamical system (LDS) for a segment of the user's trajectory (Sec. III).
 
-Within a segment the offset x = p - g from its subgoal g obeys x[n+1] = A x[n]; A comes from closed-form least squares.
-The companion work that the paper cites for the fit could not be found: this one is a reconstruction.
+Within a segment the offset x = p - g from its subgoal g obeys x[n+1] = A x[n]; A comes from
+closed-form least squares. The companion work that the paper cites for the fit could not be found:
+this one is a reconstruction.
 
-Symbols: A (2, 2) matrix of an LDS, G0 = sum x[n] x[n]^T and G1 = sum x[n+1] x[n]^T its statistics, d = 2 dimensions.
+Symbols: A (2, 2) matrix of an LDS, G0 = sum x[n] x[n]^T and G1 = sum x[n+1] x[n]^T its statistics,
+d = 2 dimensions.
 """
 
 from dataclasses import dataclass, replace
@@ -17,8 +19,11 @@ from dollop.trajectory import check_trajectories, retime
 __all__ = ["DECAY", "LDS", "NOTHING", "STEPS", "Statistics", "dot", "powers_on"]
 
 SHRINKAGE = 1e-3  # share of the mean variance that is added to every direction of G0
-STEPS, DECAY = 40, 3.0  # a re-timed segment: its steps, and the time constants over which it decays
-NOTHING = 1e-18  # m^2, a squared length that counts as zero
+STEPS, DECAY = 40, 3.0
+"""A re-timed segment: its steps, and the time constants over which it decays."""
+
+NOTHING = 1e-18
+"""m^2: a squared length that counts as zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +33,17 @@ class Statistics:
     Attributes
     ----------
     G0, G1 : (..., d, d) float arrays
-        Sums of x[n] x[n]^T and of x[n+1] x[n]^T over all samples but the last, in m^2, x being the offset from the end.
+        Sums of x[n] x[n]^T and of x[n+1] x[n]^T over all samples but the last, in m^2, x being the
+        offset from the end.
+
+    Examples
+    --------
+    The fit to two walks is that of their statistics' sum, so that walks need not be kept:
+
+    >>> walks = np.random.default_rng(0).normal(size=(2, 50, 2)).cumsum(axis=1)
+    >>> one, other = (Statistics.of(walk) for walk in walks)
+    >>> np.allclose((one + other).matrix, LDS.fit(list(walks), retimed=False).A)
+    True
     """
 
     G0: np.ndarray
@@ -42,17 +57,29 @@ class Statistics:
 
     @classmethod
     def of(cls, samples):
-        """Statistics of trajectories of one length, (..., N, d), each shifted by its own last sample."""
+        """Statistics of trajectories of one length, each shifted by its own last sample.
+
+        Parameters
+        ----------
+        samples : (..., N, d) float array
+            Positions in m.
+
+        Returns
+        -------
+        Statistics
+            (..., d, d), m^2.
+        """
         offsets = samples - samples[..., -1:, :]
         before = np.swapaxes(offsets[..., :-1, :], -1, -2)
         return cls(before @ offsets[..., :-1, :], np.swapaxes(before @ offsets[..., 1:, :], -1, -2))
 
     @property
     def regular(self):
-        """G0 and G1 shrunk towards a uniform decay, so that a straight segment leaves nothing undetermined.
+        """G0 and G1, (..., d, d) in m^2, shrunk towards a uniform decay: nothing is undetermined.
 
-        As if further demonstrations came straight in along each axis with the segment's own `decay`, so the fit stays
-        stable. (Shrinking A to zero instead would have every error beside the path undone in one step.)
+        As if further demonstrations came straight in along each axis with the segment's own
+        `decay`, so the fit stays stable also for a straight segment. (Shrinking A to zero instead
+        would have every error beside the path undone in one step.) A reconstruction.
         """
         size = np.maximum(np.trace(self.G0, axis1=-2, axis2=-1), NOTHING)
         d = self.G0.shape[-1]
@@ -61,34 +88,34 @@ class Statistics:
 
     @property
     def decay(self):
-        """The one number a that fits x[n+1] = a x[n] best, (...): a = tr G1 / tr G0, always between -1 and 1."""
+        """The one number a (...) that fits x[n+1] = a x[n] best: tr G1 / tr G0, from -1 to 1."""
         size = np.maximum(np.trace(self.G0, axis1=-2, axis2=-1), NOTHING)
         return np.trace(self.G1, axis1=-2, axis2=-1) / size
 
     @property
     def matrix(self):
-        """A = G1 G0^-1 after shrinkage, (..., d, d): closed-form least squares, spectral radius below one."""
+        """A = G1 G0^-1 (..., d, d) after shrinkage: least squares, spectral radius below one."""
         G0, G1 = self.regular
         return np.swapaxes(np.linalg.solve(G0, np.swapaxes(G1, -1, -2)), -1, -2)
 
 
 @dataclass(frozen=True, eq=False)
 class LDS:
-    """A linear dynamical system that comes to rest at its subgoal, from anywhere.
+    """A linear dynamical system that comes to rest at its subgoal, from anywhere (Sec. III).
 
     Attributes
     ----------
-    A : (2, 2) float array
-        Per step, spectral radius below one; it follows from the statistics.
     statistics : Statistics
-        Those of two segments add up to the LDS that describes both, if both are re-timed or neither is.
+        G0 and G1 (2, 2). Those of two segments add up to the LDS that describes both, if both are
+        re-timed or neither is.
     goal : (2,) float array
         The subgoal, m.
 
     Raises
     ------
     ValueError
-        Statistics or a goal that are not finite or not of two dimensions, or statistics that no trajectory has.
+        Statistics or a goal that are not finite or not of two dimensions, or statistics that no
+        trajectory has.
     """
 
     statistics: Statistics
@@ -111,21 +138,24 @@ class LDS:
 
     @cached_property
     def A(self):
+        """(2, 2) float array: the matrix per step, of spectral radius below one."""
         return self.statistics.matrix
 
     @classmethod
     def fit(cls, trajectories, retimed=True):
         """Fit one LDS to one or several trajectories by least squares in closed form (Sec. III).
 
-        Each trajectory is shifted by its own end, which makes the estimate stable whatever the data.
+        Each trajectory is shifted by its own end, which makes the estimate stable whatever the
+        data.
 
         Parameters
         ----------
-        trajectories : (N, 2) array_like or sequence of (N_k, 2) array_like
+        trajectories : (N, 2) array_like or sequence of K (N_k, 2) array_like
             Positions in m.
         retimed : bool
-            Fit to the re-timed curves (see `dollop.trajectory.retime`), every trajectory counting the same; or to the
-            samples as they are, every sample counting the same and A being per sample.
+            Fit to the re-timed curves (see `dollop.trajectory.retime`), every trajectory counting
+            the same; or to the samples as they are, every sample counting the same and A being per
+            sample.
 
         Returns
         -------
@@ -151,29 +181,110 @@ class LDS:
         return cls(sum(others, first), goal)
 
     def turned(self, angle):
-        """The LDS turned about its subgoal by an angle in rad: A becomes R A R^T."""
+        """The LDS turned about its subgoal: A becomes R A R^T.
+
+        Parameters
+        ----------
+        angle : float
+            rad.
+
+        Returns
+        -------
+        LDS
+            With the same subgoal.
+
+        Examples
+        --------
+        >>> lds = LDS.fit([[0.0, 1.0], [1.0, 0.5], [2.0, 0.0]])
+        >>> np.allclose(lds.turned(0.7).turned(-0.7).A, lds.A)
+        True
+        """
         R = rotation(angle)
         G0, G1 = self.statistics.G0, self.statistics.G1
         return replace(self, statistics=Statistics(R @ G0 @ R.T, R @ G1 @ R.T))
 
     def step(self, x):
-        """The next state after x, (..., 2), in m: g + A (x - g)."""
+        """The next state, x[n+1] = A x[n] about the subgoal (Sec. III).
+
+        Parameters
+        ----------
+        x : (..., 2) array_like
+            States in m.
+
+        Returns
+        -------
+        (..., 2) float array
+            g + A (x - g) in m.
+
+        Raises
+        ------
+        ValueError
+            Not two finite numbers each.
+        """
         return self.goal + (check_states(x) - self.goal) @ self.A.T
 
     def response(self, x0, n):
-        """The n steps after x0 (2,), in m: (n + 1, 2), x0 included."""
+        """The states from a start on (Sec. III).
+
+        Parameters
+        ----------
+        x0 : (2,) array_like
+            Start in m.
+        n : int
+            Number of steps.
+
+        Returns
+        -------
+        (n + 1, 2) float array
+            m, x0 included.
+
+        Raises
+        ------
+        ValueError
+            A start that is not two finite numbers, or a number of steps that is none.
+
+        Examples
+        --------
+        It comes to rest at the subgoal:
+
+        >>> lds = LDS.fit([[0.0, 1.0], [1.0, 0.5], [2.0, 0.0]])
+        >>> np.allclose(lds.response([-5.0, 7.0], 500)[-1], lds.goal)
+        True
+        """
         if n != int(n) or n < 0:
             raise ValueError(f"n must be a whole number of steps from 0 on, got {n}")
         return self.goal + powers_on(self.A, check_states(x0) - self.goal, int(n))
 
     def lyapunov(self, x):
-        """(x - g)^T G0^-1 (x - g) for x (..., 2) in m: zero at the subgoal, and it never grows along a response."""
+        """Lyapunov function (x - g)^T G0^-1 (x - g), which never grows along a response.
+
+        Parameters
+        ----------
+        x : (..., 2) array_like
+            States in m.
+
+        Returns
+        -------
+        (...) float array
+            Without unit.
+
+        Raises
+        ------
+        ValueError
+            Not two finite numbers each.
+
+        Examples
+        --------
+        >>> lds = LDS.fit([[0.0, 1.0], [1.0, 0.5], [2.0, 0.0]])
+        >>> bool((np.diff(lds.lyapunov(lds.response([-5.0, 7.0], 30))) <= 0).all())
+        True
+        """
         offset = check_states(x) - self.goal
         return dot(offset, np.linalg.solve(self.statistics.regular[0], offset[..., None])[..., 0])
 
 
 def check_states(x):
-    """States as a float array (..., 2); ValueError if they are not finite or of another dimension."""
+    """States as a float array (..., 2); ValueError if not finite or of another dimension."""
     states = np.asarray(x, float)
     if not states.ndim or states.shape[-1] != 2 or not np.isfinite(states).all():
         raise ValueError(f"a state must be two finite numbers, got {x}")
@@ -181,7 +292,27 @@ def check_states(x):
 
 
 def powers_on(A, x, n):
-    """A^0 x, A^1 x, ..., A^n x for stacked A (..., d, d) and x (..., d): (..., n + 1, d), by doubling."""
+    """A^0 x, A^1 x, ..., A^n x, by doubling.
+
+    Parameters
+    ----------
+    A : (..., d, d) float array
+        Matrices.
+    x : (..., d) float array
+        Vectors.
+    n : int
+        From 0 on.
+
+    Returns
+    -------
+    (..., n + 1, d) float array
+        In the unit of x.
+
+    Examples
+    --------
+    >>> powers_on(np.array([[0.5]]), np.array([8.0]), 3)[:, 0]
+    array([8., 4., 2., 1.])
+    """
     states, step = x[..., None, :], np.swapaxes(A, -1, -2)
     while states.shape[-2] <= n:
         states = np.concatenate([states, states @ step], axis=-2)
@@ -190,5 +321,16 @@ def powers_on(A, x, n):
 
 
 def dot(a, b):
-    """Inner products (...) of vectors (..., d)."""
+    """Inner products of vectors.
+
+    Parameters
+    ----------
+    a, b : (..., d) float arrays
+        Vectors.
+
+    Returns
+    -------
+    (...) float array
+        In the units' product.
+    """
     return np.einsum("...d,...d->...", a, b)

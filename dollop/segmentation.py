@@ -1,8 +1,9 @@
-"""Where to cut a trajectory into segments of one LDS each (Sec. III): exact, by dynamic programming.
+"""Where to cut a trajectory into segments of one LDS each, by dynamic programming (Sec. III).
 
-An LDS is fitted to every possible segment, and what is compared with the trajectory is its whole response: the error of
-single steps is tiny for any finely sampled path. The companion work that the paper cites for the segmentation could not
-be found: criterion, search and the meaning of the tolerance are reconstructions.
+An LDS is fitted to every possible segment, and what is compared with the trajectory is its whole
+response: the error of single steps is tiny for any finely sampled path. The companion work that
+the paper cites for the segmentation could not be found: criterion, search and the meaning of the
+tolerance are reconstructions.
 
 Symbols: C candidate cuts, d = 2 dimensions, K trajectories; G0 and G1 as in `dollop.lds`.
 """
@@ -12,17 +13,28 @@ import numpy as np
 from dollop.lds import DECAY, NOTHING, STEPS, Statistics, dot, powers_on
 from dollop.trajectory import remaining_share
 
-__all__ = ["best_segments", "fewest_segments", "raw_statistics", "retimed_statistics", "segment_errors"]
+__all__ = ["HORIZON", "best_segments", "fewest_segments", "raw_statistics", "retimed_statistics", "segment_errors"]
 
-HORIZON, SETTLED = 48, 4.0  # the search follows a response over this many points, this many time constants
-EVEN = 1e-8  # m per squared cut: among equal errors the more even division, not what rounding prefers
+HORIZON, SETTLED = 48, 4.0
+"""The search follows a response over this many points, over this many time constants."""
+
+EVEN = 1e-8  # m per squared cut: of equal errors the more even division, not as rounding has it
 
 
 def retimed_statistics(aligned):
-    """The function (start, length) -> Statistics of re-timed segments, summed over the walks.
+    """The statistics of re-timed segments, summed over the walks (a reconstruction).
 
-    `aligned` (K, 2 C - 1, d) has a sample at each of the C candidate cuts and one between; start (...) counts cuts, and
-    all segments of one call have the same length, because then they also share the places at which they are sampled.
+    Parameters
+    ----------
+    aligned : (K, 2 C - 1, d) float array
+        Walks in m, with a sample at each of the C candidate cuts and one between.
+
+    Returns
+    -------
+    callable
+        (start, length) -> Statistics (..., d, d). Start (...) and length count cuts; all segments
+        of one call have one length, because then they also share the places at which they are
+        sampled.
     """
 
     def statistics(start, length):
@@ -37,9 +49,20 @@ def retimed_statistics(aligned):
 
 
 def raw_statistics(walks, moments):
-    """The function (start, length) -> Statistics of the samples as they are, from sums taken once along each walk.
+    """The statistics of segments of the samples as they are, from sums taken once along each walk.
 
-    `moments` (K, C) are the fractional sample numbers of the candidate cuts; start counts cuts, as does length.
+    Parameters
+    ----------
+    walks : sequence of K (N_k, d) float arrays
+        m.
+    moments : (K, C) float array
+        Fractional sample numbers of the candidate cuts.
+
+    Returns
+    -------
+    callable
+        (start, length) -> Statistics (..., d, d), as of `retimed_statistics`, summed over the
+        walks.
     """
     cuts = moments.round().astype(int)
     sums = [running_sums(walk - walk.mean(axis=0)) for walk in walks]
@@ -53,14 +76,14 @@ def raw_statistics(walks, moments):
 
 
 def running_sums(walk):
-    """The walk (N, d) and the sums of p[n], p[n] p[n]^T and p[n+1] p[n]^T over the n before each sample."""
+    """The walk (N, d), and sums of p[n], p[n] p[n]^T, p[n+1] p[n]^T over the n before each."""
     now, after = walk[:-1], walk[1:]
     terms = now, now[:, :, None] * now[:, None], after[:, :, None] * now[:, None]
     return walk, *(np.concatenate([np.zeros((1, *term.shape[1:])), term.cumsum(axis=0)]) for term in terms)
 
 
 def shifted_sums(sums, start, end):
-    """Statistics of samples start to end (...) of a walk, shifted by the last: the products expanded."""
+    """Statistics of samples start to end (...), shifted by the last: the products expanded."""
     walk, first, now, after = sums
     goal, count = walk[end], (end - start)[..., None, None]
     total = first[end] - first[start]
@@ -68,7 +91,8 @@ def shifted_sums(sums, start, end):
     square = count * outer(goal, goal)
     G0 = now[end] - now[start] - outer(total, goal) - outer(goal, total) + square
     G1 = after[end] - after[start] - outer(later, goal) - outer(goal, total) + square
-    moves = np.trace(G0, axis1=-2, axis2=-1) > 1e-10 * np.trace(now[-1])  # less is what rounding leaves of nothing
+    # Less than this is what rounding leaves of nothing.
+    moves = np.trace(G0, axis1=-2, axis2=-1) > 1e-10 * np.trace(now[-1])
     return Statistics(np.where(moves[..., None, None], G0, 0), np.where(moves[..., None, None], G1, 0))
 
 
@@ -78,20 +102,20 @@ def outer(a, b):
 
 
 def segment_errors(path, statistics):
-    """Total distance in m from the path to the response of every possible segment.
+    """Total distance from the path to the response of every possible segment (a reconstruction).
 
     Parameters
     ----------
     path : (C, d) float array
-        The walks' mean at the candidate cuts.
+        The walks' mean at the candidate cuts, m.
     statistics : callable
         (start, length) -> Statistics.
 
     Returns
     -------
     (C, C) float array
-        [i, j] for the segment from cut i to cut j, summed over the cuts between; `inf` where there is none between,
-        since such a segment would not be put to any test.
+        In m: [i, j] for the segment from cut i to cut j, summed over the cuts between; `inf` where
+        there is none between, since such a segment would not be put to any test.
     """
     errors = np.full((len(path), len(path)), np.inf)
     for length in range(2, len(path)):
@@ -106,7 +130,8 @@ def segment_errors(path, statistics):
 def candidate_responses(statistics, x0):
     """Responses (B, HORIZON + 2, d) from offsets x0 (B, d), up to the subgoal at 0.
 
-    Slow systems are shown by every m-th state, m a power of two such that the response settles within the horizon.
+    Slow systems are shown by every m-th state, m a power of two such that the response settles
+    within the horizon.
     """
     time_constants = -1 / np.log(np.clip(statistics.decay, 0.5, 1 - 1e-6))  # in steps
     doublings = np.log2(np.maximum(SETTLED * time_constants / HORIZON, 1)).astype(int)
@@ -118,10 +143,11 @@ def candidate_responses(statistics, x0):
 
 
 def distances(points, polylines):
-    """Distances (B, T) of points (B, T, d) to polylines (B, V, d), to the two edges beside the nearest vertex.
+    """Distances (B, T) of points (B, T, d) to polylines (B, V, d), beside their nearest vertices.
 
-    That is what makes the search fast. Where a polyline comes closest between two vertices that are both farther away
-    than a third one, the distance is slightly too large, never too small.
+    Only the two edges at the nearest vertex are looked at: that is what makes the search fast.
+    Where a polyline comes closest between two vertices that are both farther away than a third one,
+    the distance is slightly too large, never too small.
     """
     count, d = polylines.shape[1:]
     vertices = polylines.astype(np.float32)  # only to choose the nearest: |v|^2 - 2 v p
@@ -143,7 +169,10 @@ def distance_to_edge(points, tail, head):
 
 
 def fewest_segments(errors, tolerance):
-    """Cuts of the division with the fewest segments of mean error within tolerance, then the least total error.
+    """Cuts of the division with the fewest segments of mean error within tolerance (Sec. III).
+
+    Among divisions with as few segments it is the one with the least total error. The meaning of
+    the tolerance is a reconstruction.
 
     Parameters
     ----------
@@ -154,13 +183,22 @@ def fewest_segments(errors, tolerance):
 
     Returns
     -------
-    (K + 1,) int array
-        The cuts, the first 0 and the last C - 1.
+    (S + 1,) int array
+        The cuts of S segments, the first 0 and the last C - 1.
 
     Raises
     ------
     ValueError
         No division keeps the tolerance; the message says which it could keep.
+
+    Examples
+    --------
+    Segments that end or begin at cut 2 are perfect, all others are 1 m off at each cut:
+
+    >>> errors = np.ones((5, 5)) * np.maximum(np.arange(5) - np.arange(5)[:, None], 1)
+    >>> errors[0, 2] = errors[2, 4] = 0
+    >>> fewest_segments(errors, 0.5), fewest_segments(errors, 2)
+    (array([0, 2, 4]), array([0, 4]))
     """
     count = len(errors)
     mean = errors / np.maximum(np.arange(count) - np.arange(count)[:, None], 1)
@@ -175,14 +213,28 @@ def fewest_segments(errors, tolerance):
 
 
 def best_segments(errors, n_segments):
-    """Cuts (K + 1,) of the division into n_segments with the least total error; errors as in `fewest_segments`."""
+    """Cuts of the division into so many segments with the least total error (a reconstruction).
+
+    Parameters
+    ----------
+    errors : (C, C) float array
+        From `segment_errors`, m.
+    n_segments : int
+        S.
+
+    Returns
+    -------
+    (S + 1,) int array or None
+        The cuts, the first 0 and the last C - 1; None if there are too few candidates.
+    """
     return divide(errors, lambda total, k: k == n_segments)
 
 
 def divide(errors, enough):
-    """Dynamic programming over D[k][j] = min_i D[k-1][i] + errors[i][j], until enough(D[k][-1], k); None if never.
+    """Dynamic programming over D[k][j] = min_i D[k-1][i] + errors[i][j], until enough(D[k][-1], k).
 
-    On straight parts of a trajectory many divisions have the same errors: then the most even one, cut early, is best.
+    The cuts (k + 1,), or None if it is never enough. On straight parts of a trajectory many
+    divisions have the same errors: then the most even one, cut early, is best.
     """
     cut = np.arange(len(errors))
     errors = errors + EVEN * ((cut - cut[:, None]) ** 2 + 0.01 * cut)

@@ -10,7 +10,7 @@ from dollop.trajectory import align, arc_length, check_trajectories, check_traje
 
 __all__ = ["SequencedLDS"]
 
-LEAST_REACH = 1e-6  # m: nearer to a subgoal than what coordinates can tell, a response would never arrive
+LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none would ever arrive
 MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
 
 
@@ -44,13 +44,14 @@ class SequencedLDS:
 
     @classmethod
     def fit(cls, trajectories, tolerance=0.02, n_segments=None, retimed=True, sample_period=0.1, candidates=100):
-        """Divide one trajectory, or several walks of the same one, into segments with one LDS each (Sec. III).
+        """Divide a trajectory, or several walks of it, into segments of one LDS each (Sec. III).
 
-        Several walks are aligned (`dollop.trajectory.align`); a subgoal is the mean of the places where they are cut,
-        and an LDS is fitted to the statistics of all. The error of a segment is the mean distance from the walks' mean
-        to the response of its LDS, started at the subgoal before. Dynamic programming finds, among all divisions at the
-        candidate cuts, those with the fewest segments of which none has an error above the tolerance, and of these the
-        one with the least total error.
+        Several walks are aligned (`dollop.trajectory.align`); a subgoal is the mean of the places
+        where they are cut, and an LDS is fitted to the statistics of all. The error of a segment is
+        the mean distance from the walks' mean to the response of its LDS, started at the subgoal
+        before. Dynamic programming finds, among all divisions at the candidate cuts, those with the
+        fewest segments of which none has an error above the tolerance, and of these the one with
+        the least total error.
 
         Parameters
         ----------
@@ -59,14 +60,15 @@ class SequencedLDS:
         tolerance : float
             Largest mean error of a segment in m.
         n_segments : int, optional
-            Exactly so many segments with the least total error instead; the tolerance then plays no part.
+            Exactly so many segments with the least total error instead; the tolerance then plays no
+            part.
         retimed : bool
             Whether to fit the re-timed curves or the samples as they are (see `LDS.fit`).
         sample_period : float
             Time between samples in s; only `speeds` depends on it.
         candidates : int
-            Number of places, at equal distances, where the trajectory may be cut, both its ends included. The time
-            taken grows with the cube.
+            Number of places, at equal distances, where the trajectory may be cut, both its ends
+            included. The time taken grows with the cube.
 
         Returns
         -------
@@ -75,7 +77,8 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            Trajectories as in `LDS.fit`, a parameter out of its range, or a tolerance that no division keeps.
+            Trajectories as in `LDS.fit`, a parameter out of its range, or a tolerance that no
+            division keeps.
 
         Examples
         --------
@@ -96,10 +99,10 @@ class SequencedLDS:
         return cls(segments, path[0], demonstrated_speeds(walks, moments[:, cuts], sample_period))
 
     def response(self, start=None, reach=0.01):
-        """Follow the segments, handing over to the next within reach of each subgoal.
+        """Follow the segments, handing over to the next within reach of each subgoal (Sec. III).
 
-        Since every LDS is stable, this happens after finitely many steps from any start. The next segment sets out
-        from the place of the handing over.
+        Since every LDS is stable, this happens after finitely many steps from any start. The next
+        segment sets out from the place of the handing over.
 
         Parameters
         ----------
@@ -112,6 +115,20 @@ class SequencedLDS:
         -------
         (M, 2) float array
             From start to within reach of the last subgoal, m.
+
+        Raises
+        ------
+        ValueError
+            A start that is no position, or too small a reach.
+
+        Examples
+        --------
+        Kidnapped, it still ends at the last subgoal:
+
+        >>> turn = np.linspace(0, np.pi / 2, 50)[:, None]
+        >>> law = SequencedLDS.fit(np.hstack([np.cos(turn), np.sin(turn)]))
+        >>> bool(np.linalg.norm(law.response([-30.0, 20.0])[-1] - law.subgoals[-1]) <= 0.01)
+        True
         """
         state = np.asarray(self.start if start is None else start, float)
         if state.shape != (2,) or not np.isfinite(state).all():
@@ -125,7 +142,23 @@ class SequencedLDS:
         return np.array(states)
 
     def error(self, trajectory):
-        """Mean distance in m from the samples of a trajectory (N, 2) to the response."""
+        """Mean distance of a trajectory's samples to the response.
+
+        Parameters
+        ----------
+        trajectory : (N, 2) array_like
+            m.
+
+        Returns
+        -------
+        float
+            m.
+
+        Raises
+        ------
+        ValueError
+            No trajectory (see `check_trajectory`).
+        """
         return self.errors(trajectory)["mean"]
 
     def errors(self, trajectory):
@@ -139,8 +172,14 @@ class SequencedLDS:
         Returns
         -------
         dict of float
-            In m: "mean" and "max" from the samples to the nearest places on the response; "reverse" the mean from the
-            response, sampled at equal distances, to the nearest places on the trajectory.
+            In m: "mean" and "max" from the samples to the nearest places on the response; "reverse"
+            the mean from the response, sampled at equal distances, to the nearest places on the
+            trajectory.
+
+        Raises
+        ------
+        ValueError
+            No trajectory (see `check_trajectory`).
         """
         samples, response = check_trajectory(trajectory), self.response()
         there = distance_to_polyline(samples, response)
@@ -148,7 +187,9 @@ class SequencedLDS:
         return {"mean": float(there.mean()), "max": float(there.max()), "reverse": float(back.mean())}
 
     def with_subgoals(self, subgoals, start=None, turned=False):
-        """The same task with its subgoals moved; every LDS keeps its A, so the response adapts by itself.
+        """The same task with its subgoals moved (Sec. IV).
+
+        Every LDS keeps its A, so the response adapts by itself.
 
         Parameters
         ----------
@@ -157,11 +198,25 @@ class SequencedLDS:
         start : (2,) array_like, optional
             Moved as well, m; by default the demonstrations' start stays.
         turned : bool
-            Beyond the paper: turn every LDS as the line from the subgoal before to its own has turned.
+            Beyond the paper: turn every LDS as the line from the subgoal before to its own has
+            turned.
 
         Returns
         -------
         SequencedLDS
+
+        Raises
+        ------
+        ValueError
+            Another number of subgoals, or a position that is not finite.
+
+        Examples
+        --------
+        >>> turn = np.linspace(0, np.pi / 2, 50)[:, None]
+        >>> law = SequencedLDS.fit(np.hstack([np.cos(turn), np.sin(turn)]))
+        >>> moved = law.with_subgoals(law.subgoals + [3.0, 0.0], law.start + [3.0, 0.0])
+        >>> np.allclose(moved.response(), law.response() + [3.0, 0.0])
+        True
         """
         goals = np.asarray(subgoals, float)
         if goals.shape != self.subgoals.shape or not np.isfinite(goals).all():
@@ -177,7 +232,7 @@ class SequencedLDS:
 
 
 def chord_angles(start, subgoals):
-    """Direction in rad of the lines from each subgoal to the next, (K,), the first from the start."""
+    """Directions (K,) in rad of the lines from each subgoal to the next, from the start on."""
     chords = np.diff(np.vstack([start, subgoals]), axis=0)
     return np.arctan2(chords[:, 1], chords[:, 0])
 

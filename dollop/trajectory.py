@@ -1,26 +1,14 @@
-"""Trajectories as curves: arc length, re-timing, their mean, and distances between curves (used by Sec. III).
+"""Trajectories as curves: arc length, re-timing, their mean and distances between them (Sec. III).
 
-A trajectory is an (N, d) array of positions in m in the order they were visited; d is 2 in the plane.
+A trajectory is an (N, d) array of positions in m in the order they were visited; d is 2 in the
+plane.
 """
 
 import numpy as np
 
 from dollop.checks import checked_positions
 
-__all__ = [
-    "align",
-    "arc_length",
-    "at_arc_length",
-    "check_trajectories",
-    "check_trajectory",
-    "distance_to_polyline",
-    "mean_trajectory",
-    "remaining_share",
-    "resample",
-    "retime",
-]
-
-ROUNDS = 3  # how often walks are laid onto their mean: then it hardly changes any more
+_ROUNDS = 3  # how often walks are laid onto their mean: then it hardly changes any more
 
 
 def check_trajectory(trajectory, name="trajectory"):
@@ -36,11 +24,18 @@ def check_trajectory(trajectory, name="trajectory"):
     Returns
     -------
     (N, 2) float array
+        A copy, m.
 
     Raises
     ------
     ValueError
         Fewer than three points, not planar, not finite, farther away than 1e9 m, or no movement.
+
+    Examples
+    --------
+    >>> check_trajectory([[0, 1], [0, 1], [0, 1]], "walk")
+    Traceback (most recent call last):
+    ValueError: walk must move, got 3 times the position [0. 1.]
     """
     points = checked_positions(name, trajectory)
     if len(points) < 3:
@@ -55,17 +50,23 @@ def check_trajectories(trajectories):
 
     Parameters
     ----------
-    trajectories : (N, 2) array_like or sequence of (N_k, 2) array_like
+    trajectories : (N, 2) array_like or sequence of K (N_k, 2) array_like
         Positions in m.
 
     Returns
     -------
-    list of (N_k, 2) float arrays
+    list of K (N_k, 2) float arrays
+        Copies, m.
 
     Raises
     ------
     ValueError
         None given, or one of them is no trajectory (see `check_trajectory`).
+
+    Examples
+    --------
+    >>> len(check_trajectories([[0, 0], [1, 0], [2, 0]]))
+    1
     """
     if len(trajectories) == 0:
         raise ValueError("trajectories must hold at least one trajectory, got none")
@@ -101,7 +102,7 @@ def at_arc_length(points, distance):
 
     Parameters
     ----------
-    points : (N, d) float array
+    points : (N, d) array_like
         Positions in m.
     distance : (M,) array_like
         Arc lengths in m.
@@ -109,7 +110,14 @@ def at_arc_length(points, distance):
     Returns
     -------
     (M, d) float array
-        Linear between the points, held at both ends.
+        m, linear between the points, held at both ends.
+
+    Examples
+    --------
+    >>> at_arc_length([[0, 0], [3, 4], [3, 5]], [2.5, 5.5, 99])
+    array([[1.5, 2. ],
+           [3. , 4.5],
+           [3. , 5. ]])
     """
     walked = arc_length(points)
     moved = np.concatenate([[True], np.diff(walked) > 0])
@@ -122,7 +130,7 @@ def resample(points, n):
 
     Parameters
     ----------
-    points : (N, d) float array
+    points : (N, d) array_like
         Positions in m.
     n : int
         At least two.
@@ -130,34 +138,53 @@ def resample(points, n):
     Returns
     -------
     (n, d) float array
-        First and last are the curve's own.
+        m; first and last are the curve's own.
 
     Examples
     --------
-    >>> resample(np.array([[0.0, 0.0], [1.0, 0.0], [4.0, 0.0]]), 3)[:, 0]
+    >>> resample([[0, 0], [1, 0], [4, 0]], 3)[:, 0]
     array([0., 2., 4.])
     """
     return at_arc_length(points, np.linspace(0, arc_length(points)[-1], n))
 
 
 def remaining_share(n, decay):
-    """Share of the way still to go at each of the n + 1 samples of a re-timed segment: geometric, and 0 at the last."""
+    """Share of the way still to go at each sample of a re-timed segment (see `retime`).
+
+    Parameters
+    ----------
+    n : int
+        Number of steps.
+    decay : float
+        Time constants over the segment.
+
+    Returns
+    -------
+    (n + 1,) float array
+        Geometric from 1 on, and 0 at the last.
+
+    Examples
+    --------
+    >>> remaining_share(3, 3 * np.log(2))
+    array([1.  , 0.5 , 0.25, 0.  ])
+    """
     return np.append(np.exp(-decay * np.arange(n) / n), 0.0)
 
 
 def retime(points, n=60, decay=3.0):
-    r"""The same curve, walked so that the remaining way decays geometrically.
+    r"""The same curve, walked so that the remaining way decays geometrically (a reconstruction).
 
-    A user walks through a subgoal at speed; a linear system that has its equilibrium there can only slow down into it.
-    Sample j of the re-timed curve lies where the arc length
+    A user walks through a subgoal at speed; a linear system that has its equilibrium there can only
+    slow down into it. Sample j of the re-timed curve lies where the arc length
 
     .. math:: r_j = L e^{-c j / n}, \quad j < n, \qquad r_n = 0
 
-    remains, so that the curve keeps its shape and takes the one timing that a linear system can follow.
+    remains, so that the curve keeps its shape and takes the one timing that a linear system can
+    follow.
 
     Parameters
     ----------
-    points : (N, d) float array
+    points : (N, d) array_like
         Positions in m.
     n : int
         Number of steps.
@@ -167,7 +194,12 @@ def retime(points, n=60, decay=3.0):
     Returns
     -------
     (n + 1, d) float array
-        The first and last are the curve's own.
+        m; the first and last are the curve's own.
+
+    Examples
+    --------
+    >>> retime([[0, 0], [8, 0]], 3, 3 * np.log(2))[:, 0]
+    array([0., 4., 6., 8.])
     """
     length = arc_length(points)[-1]
     return at_arc_length(points, length * (1 - remaining_share(n, decay)))
@@ -203,14 +235,15 @@ def distance_to_polyline(points, polyline):
 
 
 def align(trajectories, n=200):
-    """Several walks along one curve, sampled where they belong together.
+    """Several walks along one curve, sampled where they belong together (a reconstruction).
 
-    Equal shares of arc length drift apart where one walk swings wider than another. So each walk is laid onto the mean
-    of all by the monotone warp with the least squared distance (a shortest path), and the mean is taken anew.
+    Equal shares of arc length drift apart where one walk swings wider than another. So each walk is
+    laid onto the mean of all by the monotone warp with the least squared distance (a shortest
+    path), and the mean is taken anew.
 
     Parameters
     ----------
-    trajectories : (N, 2) array_like or sequence of (N_k, 2) array_like
+    trajectories : (N, 2) array_like or sequence of K (N_k, 2) array_like
         Positions in m; all start and end at corresponding places.
     n : int
         Number of samples.
@@ -218,21 +251,36 @@ def align(trajectories, n=200):
     Returns
     -------
     aligned : (K, n, 2) float array
-        Sample i of every walk belongs to sample i of every other.
+        m; sample i of every walk belongs to sample i of every other.
     share : (K, n) float array
         The share of each walk's arc length at which it was sampled, rising from 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        What `check_trajectories` refuses.
+
+    Examples
+    --------
+    One walk makes a detour to (1, 1) and back; half of both ways is not the same place:
+
+    >>> line = np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]])
+    >>> detour = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, 0.0], [3.0, 0.0]])
+    >>> aligned, share = align([line, detour], 101)
+    >>> bool(share[1, 50] > share[0, 50])
+    True
     """
     walks = check_trajectories(trajectories)
     share = np.tile(np.linspace(0, 1, n), (len(walks), 1))
     aligned = np.stack([resample(walk, n) for walk in walks])
     fine = np.stack([resample(walk, 2 * n - 1) for walk in walks]) if len(walks) > 1 else None
-    for _ in range(ROUNDS if len(walks) > 1 else 0):
-        share = monotone_warp(resample(aligned.mean(axis=0), n), fine)
+    for _ in range(_ROUNDS if len(walks) > 1 else 0):
+        share = _monotone_warp(resample(aligned.mean(axis=0), n), fine)
         aligned = np.stack([at_arc_length(w, s * arc_length(w)[-1]) for w, s in zip(walks, share, strict=True)])
     return aligned, share
 
 
-def monotone_warp(reference, walks):
+def _monotone_warp(reference, walks):
     """Lay walks monotonically onto a reference, both sampled at equal distances.
 
     What is least is the sum of squared distances and of squared slips along the path per step.
@@ -242,7 +290,8 @@ def monotone_warp(reference, walks):
     reference : (n, d) float array
         m.
     walks : (K, 2 n - 1, d) float array
-        m, sampled twice as finely, so that a walk may lag or lead by half steps, at most twice as fast.
+        m, sampled twice as finely, so that a walk may lag or lead by half steps, at most twice as
+        fast.
 
     Returns
     -------
@@ -266,11 +315,11 @@ def monotone_warp(reference, walks):
 
 
 def mean_trajectory(trajectories, n=200):
-    """The mean of several walks along one curve.
+    """The mean of several walks along one curve (a reconstruction, see `align`).
 
     Parameters
     ----------
-    trajectories : (N, 2) array_like or sequence of (N_k, 2) array_like
+    trajectories : (N, 2) array_like or sequence of K (N_k, 2) array_like
         Positions in m; all start and end at corresponding places.
     n : int
         Number of samples.
@@ -279,5 +328,18 @@ def mean_trajectory(trajectories, n=200):
     -------
     (n, 2) float array
         m, at equal distances.
+
+    Raises
+    ------
+    ValueError
+        What `check_trajectories` refuses.
+
+    Examples
+    --------
+    >>> left, right = [[0, 1], [1, 1], [2, 1]], [[0, -1], [1, -1], [2, -1]]
+    >>> mean_trajectory([left, right], 3)
+    array([[0., 0.],
+           [1., 0.],
+           [2., 0.]])
     """
     return resample(align(trajectories, n)[0].mean(axis=0), n)

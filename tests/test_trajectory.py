@@ -5,12 +5,12 @@ import pytest
 from walks import walk_figure_eights
 
 from dollop.trajectory import (
+    _monotone_warp,
     align,
     check_trajectories,
     check_trajectory,
     distance_to_polyline,
     mean_trajectory,
-    monotone_warp,
     resample,
     retime,
 )
@@ -75,7 +75,7 @@ def test_warp_is_the_best_of_all_monotone_ones(seed):
         return apart + (step**2 * (np.diff(at) - 2.0) ** 2).sum()
 
     every = [np.cumsum([0, *moves]) for moves in np.ndindex(*(5,) * (n - 1)) if sum(moves) == 2 * n - 2]
-    found = np.round(monotone_warp(reference, walk[None])[0] * (2 * n - 2)).astype(int)
+    found = np.round(_monotone_warp(reference, walk[None])[0] * (2 * n - 2)).astype(int)
     assert cost(found) == pytest.approx(min(map(cost, every)))
 
 
