@@ -1,7 +1,8 @@
-"""Foreground objects: from laser scans to blobs and their centroids (Sec. II, after Fod et al. 2002).
+"""Foreground objects: from laser scans to blobs and their centroids (Sec. II).
 
-A reading with no background object near it is a foreground cell; cells are remembered autoregressively in a
-foreground grid; adjacent occupied cells are a blob; a blob that is large enough is a foreground object.
+As the paper does it after Fod et al. (ICRA 2002): a reading with no background object near it is a
+foreground cell; cells are remembered autoregressively in a foreground grid; adjacent occupied
+cells are a blob; a blob that is large enough is a foreground object.
 """
 
 from dataclasses import dataclass
@@ -12,24 +13,12 @@ import scipy
 from dollop.checks import check_positive
 from dollop.gridmap import in_metres
 
-__all__ = [
-    "Blobs",
-    "ForegroundGrid",
-    "bounding_boxes",
-    "endpoints",
-    "find_blobs",
-    "foreground_mask",
-    "near_together",
-    "seen_free",
-    "surface_points",
-]
-
-EIGHT_CONNECTED = np.ones((3, 3), dtype=bool)
+_EIGHT_CONNECTED = np.ones((3, 3), dtype=bool)
 
 
 @dataclass(frozen=True, eq=False)
 class Blobs:
-    """Foreground objects of one moment: adjacent occupied cells that envelop enough area.
+    """Foreground objects of one moment: adjacent occupied cells that envelop enough area (Sec. II).
 
     Attributes
     ----------
@@ -60,7 +49,7 @@ def endpoints(log):
     Returns
     -------
     (T, B, 2) float array
-        Metres; `nan` where nothing came back.
+        m; `nan` where nothing came back.
     """
     ranges = np.where(np.isfinite(log.ranges), log.ranges, np.nan)
     bearings = log.poses[:, 2:] + log.angles
@@ -69,7 +58,7 @@ def endpoints(log):
 
 
 def foreground_mask(points, background, background_radius=0.20):
-    """Which readings the background map does not explain.
+    """Which readings the background map does not explain (Sec. II).
 
     Parameters
     ----------
@@ -78,16 +67,19 @@ def foreground_mask(points, background, background_radius=0.20):
     background : OccupancyGrid
         The background occupancy grid map.
     background_radius : float
-        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20 centimetres).
+        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20
+        centimetres).
 
     Returns
     -------
     (...) bool array
+        False where nothing came back, and outside the map.
 
     Raises
     ------
     ValueError
-        If more than a tenth of the readings lie outside the map, or the radius is not positive and finite.
+        If more than a tenth of the readings lie outside the map, or the radius is not positive and
+        finite.
     """
     check_positive("background_radius", background_radius)
     flat = points.reshape(-1, 2)
@@ -106,10 +98,11 @@ def foreground_mask(points, background, background_radius=0.20):
 
 
 def surface_points(points, mask, spacing=0.05, jump=0.30):
-    """Foreground readings, and the surface between readings of neighbouring beams.
+    """Foreground readings, and the surface between those of neighbouring beams (a reconstruction).
 
-    Beams fan out: 5 m away one degree is 9 cm, more than a cell, and a torso would fall apart into separate blobs.
-    Two neighbouring foreground readings closer than `jump` lie on one surface, which is filled in between.
+    Beams fan out: 5 m away one degree is 9 cm, more than a cell, and a torso would fall apart into
+    separate blobs. Two neighbouring foreground readings closer than `jump` lie on one surface,
+    which is filled in between.
 
     Parameters
     ----------
@@ -127,7 +120,13 @@ def surface_points(points, mask, spacing=0.05, jump=0.30):
     scan : (M,) int array
         Scan of each point, ascending.
     points : (M, 2) float array
-        Metres.
+        m.
+
+    Examples
+    --------
+    >>> beams = np.array([[[1.0, 0.0], [1.0, 0.12], [1.0, 2.0]]])
+    >>> surface_points(beams, np.ones((1, 3), bool), spacing=0.1)[1][:, 1].round(2)
+    array([0.  , 0.12, 2.  , 0.04, 0.08])
     """
     scan, beam = np.nonzero(mask)
     readings = points[scan, beam]
@@ -143,14 +142,15 @@ def surface_points(points, mask, spacing=0.05, jump=0.30):
 
 
 def seen_free(points, pose, angles, ranges, margin=0.0):
-    """Whether the beam nearest in bearing to each point went on beyond it.
+    """Whether the beam nearest in bearing to each point went on beyond it (Sec. II).
 
-    A beam stands for half a step to either side, so that a laser that looks all round has no gap where it begins.
+    A beam stands for half a step to either side, so that a laser that looks all round has no gap
+    where it begins.
 
     Parameters
     ----------
     points : (M, 2) float array
-        Metres.
+        m.
     pose : (3,) float array
         Sensor x, y in m, theta in rad.
     angles, ranges : (B,) float arrays
@@ -162,9 +162,18 @@ def seen_free(points, pose, angles, ranges, margin=0.0):
     -------
     (M,) bool array
         False outside the field of view.
+
+    Examples
+    --------
+    What stands behind a reading is in its shadow, not free:
+
+    >>> points = np.array([[1.0, 0.0], [3.0, 0.0], [-1.0, 0.0]])
+    >>> seen_free(points, np.zeros(3), np.array([-0.1, 0.0, 0.1]), np.full(3, 2.0))
+    array([ True, False, False])
     """
     offset = points - pose[:2]
-    # Counted from the right edge of the field of view, a bearing is the same wherever the sensor's frame has its zero.
+    # From the right edge of the field of view on, a bearing is the same wherever the sensor's
+    # frame has its zero.
     step = (angles[-1] - angles[0]) / max(len(angles) - 1, 1)
     right = angles[0] - step / 2
     bearing = (np.arctan2(offset[:, 1], offset[:, 0]) - (pose[2] + right)) % (2 * np.pi)
@@ -174,19 +183,26 @@ def seen_free(points, pose, angles, ranges, margin=0.0):
 
 
 class ForegroundGrid:
-    """The foreground occupancy grid: a cell's value follows what the laser sees there, autoregressively (Sec. II).
+    """The foreground occupancy grid: a cell follows what the laser sees there (Sec. II).
 
         g <- (1 - gain) g + gain * hit        for cells that were hit or that a beam passed through
 
-    Cells that no beam reached keep their value: what stands in the shadow of the user is not erased.
+    Cells that no beam reached keep their value: what stands in the shadow of the user is not
+    erased. That the memory is autoregressive is the paper's; what it does in the shadow is a
+    reconstruction.
 
     Parameters
     ----------
     background : OccupancyGrid
         Gives origin, resolution and shape.
     gain : float
-        Weight of the newest scan, in (0, 1]. A high gain follows a walker without dragging a tail; a low one
-        remembers what is static.
+        Weight of the newest scan, in (0, 1]. A high gain follows a walker without dragging a tail;
+        a low one remembers what is static.
+
+    Raises
+    ------
+    ValueError
+        A gain out of its range.
     """
 
     def __init__(self, background, gain):
@@ -201,7 +217,7 @@ class ForegroundGrid:
         self._active = np.zeros(0, dtype=np.intp)
 
     def update(self, hits, pose, angles, ranges):
-        """Take in one scan.
+        """Take in one scan (Sec. II).
 
         Parameters
         ----------
@@ -227,13 +243,24 @@ class ForegroundGrid:
         self._active = cells[value > 0]
 
     def centres(self, cells):
-        """Centres (M, 2) in m of the cells with flat indices `cells` (M,)."""
+        """Centres of cells.
+
+        Parameters
+        ----------
+        cells : (M,) int array
+            Flat indices.
+
+        Returns
+        -------
+        (M, 2) float array
+            m.
+        """
         row, column = np.divmod(cells, self.shape[1])
         places = in_metres(column + 0.5, row + 0.5, self.origin, self.resolution)
         return np.column_stack(places)
 
     def blobs(self, threshold=0.5, min_area=0.01):
-        """Blobs of occupied cells, remembered ones included.
+        """Blobs of occupied cells, remembered ones included (Sec. II).
 
         Parameters
         ----------
@@ -250,40 +277,59 @@ class ForegroundGrid:
         return find_blobs(np.column_stack(np.divmod(occupied, self.shape[1])), self.resolution, min_area)
 
     def objects(self, threshold=0.5, min_area=0.01, stride=0.0):
-        """Centroids of the foreground objects that the last scan met.
+        """Centroids of the foreground objects that the last scan met (Sec. II).
 
-        Memory holds cells together that are one object; what it holds in the shadow is not where the object is now.
-        So the centroid is that of a blob's cells that were hit, and a blob with none is not sensed.
+        Memory holds cells together that are one object; what it holds in the shadow is not where
+        the object is now. So the centroid is that of a blob's cells that were hit, and a blob with
+        none is not sensed.
 
         Parameters
         ----------
         threshold, min_area : float
             As for `blobs`.
         stride : float
-            Blobs nearer to each other than this, in m, are one object: the legs of a walker, to a laser that sees
-            no more of them.
+            Blobs nearer to each other than this, in m, are one object: the legs of a walker, to a
+            laser that sees no more of them.
 
         Returns
         -------
         (K, 2) float array
-            Metres.
+            m.
         """
         blobs = self.blobs(threshold, min_area)
         hit = self.sensed[blobs.cells @ [self.shape[1], 1]]
         cells, labels = blobs.cells[hit], blobs.labels[hit]
         if stride > 0 and len(blobs) > 1:
-            centroids = blob_centroids(blobs.cells, blobs.labels, self.origin, self.resolution)
+            centroids = _blob_centroids(blobs.cells, blobs.labels, self.origin, self.resolution)
             labels = near_together(centroids, stride)[labels]
-        return blob_centroids(cells, labels, self.origin, self.resolution)
+        return _blob_centroids(cells, labels, self.origin, self.resolution)
 
 
 def near_together(points, distance):
-    """Group numbers (M,) of points (M, 2), where chains of points nearer than `distance` are one group."""
+    """Group points: chains of points nearer to each other than a distance are one group.
+
+    Parameters
+    ----------
+    points : (M, 2) float array
+        m.
+    distance : float
+        m.
+
+    Returns
+    -------
+    (M,) int array
+        Numbers of the groups, from 0.
+
+    Examples
+    --------
+    >>> near_together(np.array([[0.0, 0.0], [5.0, 0.0], [0.8, 0.0], [1.6, 0.0]]), 1.0)
+    array([0, 1, 0, 0], dtype=int32)
+    """
     apart = np.linalg.norm(points[:, None] - points, axis=2)
     return scipy.sparse.csgraph.connected_components(apart < distance, directed=False)[1]
 
 
-def blob_centroids(cells, labels, origin, resolution):
+def _blob_centroids(cells, labels, origin, resolution):
     """Mean (K, 2) in m of the cells (M, 2) of each blob that has any; labels (M,) from 0."""
     size = np.bincount(labels)
     row, column = (np.bincount(labels, each)[size > 0] / size[size > 0] for each in cells.T)
@@ -291,27 +337,34 @@ def blob_centroids(cells, labels, origin, resolution):
 
 
 def find_blobs(cells, resolution, min_area=0.01):
-    """Group occupied cells into blobs and keep the large ones.
+    """Group occupied cells into blobs and keep the large ones (Sec. II).
 
     Parameters
     ----------
     cells : (M, 2) int array
         Row and column of each occupied cell.
     resolution : float
-        Metres per cell.
+        m per cell.
     min_area : float
         Smallest area of a foreground object in m^2 (Sec. II).
 
     Returns
     -------
     Blobs
+
+    Examples
+    --------
+    Cells that touch at a corner are one blob:
+
+    >>> find_blobs(np.array([[0, 0], [1, 1], [8, 8]]), 0.1).labels
+    array([0, 0, 1])
     """
     if len(cells) == 0:
         return Blobs(np.zeros(0), np.zeros((0, 2), int), np.zeros(0, int))
-    rows, columns = closed_up(cells[:, 0]), closed_up(cells[:, 1])
+    rows, columns = _closed_up(cells[:, 0]), _closed_up(cells[:, 1])
     window = np.zeros((rows.max() + 1, columns.max() + 1), dtype=bool)
     window[rows, columns] = True
-    labelled, count = scipy.ndimage.label(window, EIGHT_CONNECTED)
+    labelled, count = scipy.ndimage.label(window, _EIGHT_CONNECTED)
     labels = labelled[rows, columns] - 1
     areas = resolution**2 * np.bincount(labels, minlength=count)
     large = areas >= min_area - 1e-12
@@ -319,8 +372,8 @@ def find_blobs(cells, resolution, min_area=0.01):
     return Blobs(areas[large], cells[kept], (np.cumsum(large) - 1)[labels[kept]])
 
 
-def closed_up(index):
-    """Move cells together along one axis until at most one line between them is empty: fewer cells, the same blobs."""
+def _closed_up(index):
+    """Close gaps along one axis to at most one empty line: fewer cells, the same blobs."""
     order = np.argsort(index)
     closed = np.zeros_like(index)
     closed[order[1:]] = np.cumsum(np.minimum(np.diff(index[order]), 2))
@@ -337,12 +390,17 @@ def bounding_boxes(blobs, origin, resolution):
     origin : (2,) float array
         Lower left corner of the grid in m.
     resolution : float
-        Metres per cell.
+        m per cell.
 
     Returns
     -------
     (K, 4) float array
         xmin, ymin, xmax, ymax in m.
+
+    Examples
+    --------
+    >>> bounding_boxes(find_blobs(np.array([[0, 0], [1, 2], [1, 1]]), 0.5), np.zeros(2), 0.5)
+    array([[0. , 0. , 1.5, 1. ]])
     """
     boxes = np.empty((len(blobs), 4))
     for k in range(len(blobs)):

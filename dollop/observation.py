@@ -1,4 +1,4 @@
-"""Observing the user: from a laser log and a background map to tracks, the user and the environment (Fig. 4)."""
+"""Observing the user: from a log and a background map to tracks, user and environment (Fig. 4)."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ STATIC_EVERY = 5
 
 @dataclass(frozen=True)
 class Observation:
-    """What Dollop has seen.
+    """What Dollop has seen (Sec. II).
 
     Attributes
     ----------
@@ -68,15 +68,17 @@ def observe(
     background : OccupancyGrid
         The background occupancy grid map of the workspace; it must cover the scans.
     background_radius : float
-        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20 centimetres).
+        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20
+        centimetres).
     gain, static_gain : float
-        Autoregressive gain of the foreground grid that is tracked, per scan, and of the slow one that remembers
-        static objects, per fifth scan: a walker wants no tail, a trash can wants patience.
+        Autoregressive gain of the foreground grid that is tracked, per scan, and of the slow one
+        that remembers static objects, per fifth scan: a walker wants no tail, a trash can wants
+        patience.
     min_area : float
         Smallest foreground object in m^2 (Sec. II: 100 square centimetres).
     stride : float
-        Blobs nearer to each other than this, in m, are one object. Zero for a laser at waist height, as in the paper;
-        at leg height a walker is two blobs up to half a metre apart.
+        Blobs nearer to each other than this, in m, are one object. Zero for a laser at waist
+        height, as in the paper; at leg height a walker is two blobs up to half a metre apart.
     tracker : Tracker, optional
         How objects are tracked; the paper's choices by default.
     seed : int or Generator
@@ -115,12 +117,27 @@ def observe(
 
 
 def foreground_hits(log, background, background_radius=0.20):
-    """Foreground cells of every scan.
+    """Foreground cells of every scan (Sec. II).
+
+    Parameters
+    ----------
+    log : LaserLog
+        T scans.
+    background : OccupancyGrid
+        The background occupancy grid map; it must cover the scans.
+    background_radius : float
+        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20
+        centimetres).
 
     Returns
     -------
     list of T int arrays
         Flat indices into the grid of `background`.
+
+    Raises
+    ------
+    ValueError
+        What `dollop.foreground.foreground_mask` refuses.
     """
     points = endpoints(log)
     mask = foreground_mask(points, background, background_radius)
@@ -133,8 +150,9 @@ def foreground_hits(log, background, background_radius=0.20):
 def static_boxes(grid, sensor, user=None, min_area=0.01, recent=1.0):
     """Boxes of the static foreground objects in the slow foreground grid (Sec. IV).
 
-    A laser sees the near side only, and a trash can would be half as deep as it is wide. Each box is completed away
-    from the sensor to be at least as deep along the line of sight as it is wide across it.
+    A laser sees the near side only, and a trash can would be half as deep as it is wide. Each box
+    is completed away from the sensor to be at least as deep along the line of sight as it is wide
+    across it (a reconstruction).
 
     Parameters
     ----------
@@ -167,7 +185,10 @@ def static_boxes(grid, sensor, user=None, min_area=0.01, recent=1.0):
 
 
 def completed(box, seen, sensor, resolution):
-    """Extend `box` (4,) so that it is as deep along the line of sight as the cells `seen` (M, 2) are wide across it."""
+    """Extend `box` (4,) to be as deep along the line of sight as its cells are wide across it.
+
+    `seen` (M, 2) are the centres of the cells, `sensor` (2,) is the laser's place, in m.
+    """
     sight = seen.mean(axis=0) - sensor
     sight = sight / np.hypot(*sight)
     along, across = (seen - sensor) @ sight, (seen - sensor) @ np.array([-sight[1], sight[0]])

@@ -1,11 +1,12 @@
 """Tracking foreground objects through time, and which of them is the user (Sec. II).
 
-The state of a track is its position and velocity (and, selectable, acceleration) in the plane, moved by white noise
-on the highest derivative. Both axes share one covariance, so a track of order n carries n x 2 means and one n x n
-covariance:
+The state of a track is its position and velocity (and, selectable, acceleration) in the plane,
+moved by white noise on the highest derivative. Both axes share one covariance, so a track of order
+n carries n x 2 means and one n x n covariance:
 
     x <- F x,          P <- F P F^T + Q              (prediction over dt)
-    K = P h / (h^T P h + r),   x <- x + K (z - h^T x),   P <- P - K h^T P        (Kalman update, h picks the position)
+    K = P h / (h^T P h + r)                          (Kalman update, h picks the position)
+    x <- x + K (z - h^T x),      P <- P - K h^T P
 """
 
 from dataclasses import dataclass
@@ -16,29 +17,10 @@ import scipy
 
 from dollop.checks import check_choice, check_positive
 
-__all__ = [
-    "MATCHERS",
-    "Motion",
-    "Track",
-    "Tracker",
-    "draw_particles",
-    "identify_user",
-    "kalman_filter",
-    "match_greedily",
-    "match_jointly",
-    "move_particles",
-    "particle_moments",
-    "predict",
-    "smooth",
-    "track_objects",
-    "update",
-    "user_track",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The path of one foreground object.
+    """The path of one foreground object (Sec. II).
 
     Attributes
     ----------
@@ -69,13 +51,13 @@ class Track:
 
     @property
     def speeds(self):
-        """Speed (N,) in m/s."""
+        """(N,) float array: speed in m/s."""
         return np.hypot(self.velocities[:, 0], self.velocities[:, 1])
 
 
 @dataclass(frozen=True)
 class Motion:
-    """How a foreground object is assumed to move, and how well its centroid is measured.
+    """How a foreground object is assumed to move, and how well its centroid is measured (Sec. II).
 
     Attributes
     ----------
@@ -84,8 +66,13 @@ class Motion:
     noise : float
         Spectral density of the white noise on the highest derivative, m^2/s^(2 order - 1).
     measurement_sd : float
-        Standard deviation of a centroid per axis in m. It is the body's near side that is measured, so this is
-        centimetres, not the laser's millimetres.
+        Standard deviation of a centroid per axis in m. It is the body's near side that is measured,
+        so this is centimetres, not the laser's millimetres.
+
+    Raises
+    ------
+    ValueError
+        Another order, or a noise or standard deviation that is not positive and finite.
     """
 
     order: int = 2
@@ -99,7 +86,26 @@ class Motion:
             check_positive(name, getattr(self, name))
 
     def transition(self, dt):
-        """F (n, n) and Q (n, n) over `dt` seconds: integrated white noise (Bar-Shalom et al. 2001, Sec. 6.2)."""
+        """F and Q over a time: integrated white noise (Bar-Shalom et al. 2001, Sec. 6.2).
+
+        Parameters
+        ----------
+        dt : float
+            s.
+
+        Returns
+        -------
+        F, Q : (n, n) float arrays
+            Transition of the state (m, m/s, m/s^2) and the covariance of its noise.
+
+        Examples
+        --------
+        Two steps are one long step:
+
+        >>> (F, Q), (F2, Q2) = Motion().transition(0.1), Motion().transition(0.2)
+        >>> np.allclose(F @ F, F2), np.allclose(F @ Q @ F.T + Q, Q2)
+        (True, True)
+        """
         n = self.order
         F = np.array([[dt ** (j - i) / factorial(j - i) if j >= i else 0.0 for j in range(n)] for i in range(n)])
         Q = np.empty((n, n))
@@ -110,19 +116,74 @@ class Motion:
         return F, self.noise * Q
 
     def birth(self, positions):
-        """Means (K, n, 2) and covariances (K, n, n) of objects first seen at `positions` (K, 2), velocity unknown."""
+        """States of objects at first sight, their velocity unknown (a reconstruction).
+
+        Parameters
+        ----------
+        positions : (K, 2) float array
+            m.
+
+        Returns
+        -------
+        means : (K, n, 2) float array
+            Position in m, the rest zero.
+        covariances : (K, n, n) float array
+            Diagonal: a metre per second, and per second squared, is the standard deviation of what
+            is unknown.
+        """
         means = np.zeros((len(positions), self.order, 2))
         means[:, 0] = positions
         return means, np.tile(np.diag([self.measurement_sd**2, 1.0, 1.0][: self.order]), (len(positions), 1, 1))
 
 
 def predict(means, covariances, F, Q):
-    """Kalman prediction of K tracks: means (K, n, 2), covariances (K, n, n)."""
+    """Kalman prediction of K tracks (Sec. II).
+
+    Parameters
+    ----------
+    means : (K, n, 2) float array
+        In m, m/s, m/s^2.
+    covariances : (K, n, n) float array
+        Shared by both axes.
+    F, Q : (n, n) float arrays
+        From `Motion.transition`.
+
+    Returns
+    -------
+    means : (K, n, 2) float array
+    covariances : (K, n, n) float array
+    """
     return F @ means, F @ covariances @ F.T + Q
 
 
 def update(means, covariances, measurements, measurement_sd):
-    """Kalman update of K tracks with one position (K, 2) each; returns means (K, n, 2), covariances (K, n, n)."""
+    """Kalman update of K tracks with one position each (Sec. II).
+
+    Parameters
+    ----------
+    means : (K, n, 2) float array
+        In m, m/s, m/s^2.
+    covariances : (K, n, n) float array
+        Shared by both axes.
+    measurements : (K, 2) float array
+        m.
+    measurement_sd : float
+        m.
+
+    Returns
+    -------
+    means : (K, n, 2) float array
+    covariances : (K, n, n) float array
+
+    Examples
+    --------
+    A measurement as good as the prediction takes the estimate half way and halves its variance:
+
+    >>> state = np.zeros((1, 2, 2)), np.eye(2)[None]
+    >>> means, covariances = update(*state, np.array([[4.0, 2.0]]), 1.0)
+    >>> means[0, 0], float(covariances[0, 0, 0])
+    (array([2., 1.]), 0.5)
+    """
     gain = covariances[:, :, 0] / (covariances[:, 0, 0] + measurement_sd**2)[:, None]
     innovation = measurements - means[:, 0]
     means = means + gain[:, :, None] * innovation[:, None]
@@ -144,6 +205,13 @@ def match_greedily(cost, gate):
     -------
     tracks, objects : (L,) int arrays
         The matched pairs.
+
+    Examples
+    --------
+    The nearest pair can leave the others far apart (compare `match_jointly`):
+
+    >>> match_greedily(np.array([[1.0, 2.0], [3.0, 9.0]]), 10)
+    (array([0, 1]), array([0, 1]))
     """
     tracks, objects = [], []
     open_cost = np.where(cost <= gate, cost, np.inf)
@@ -158,10 +226,27 @@ def match_greedily(cost, gate):
 
 
 def match_jointly(cost, gate):
-    """Match tracks to objects with the least total cost (the paper's "joint optimization procedure").
+    """Match with the least total cost (Sec. II: the "joint optimization procedure").
 
-    As many pairs within the gate as possible would be wrong: leaving a track unmatched costs `gate`.
-    Same parameters and result as `match_greedily`.
+    As many pairs within the gate as possible would be wrong: leaving a track unmatched costs
+    `gate`. Kuhn's Hungarian method (1955) by `scipy.optimize.linear_sum_assignment`.
+
+    Parameters
+    ----------
+    cost : (K, M) float array
+        Cost of giving object m to track k.
+    gate : float
+        Pairs that cost more are not matched.
+
+    Returns
+    -------
+    tracks, objects : (L,) int arrays
+        The matched pairs.
+
+    Examples
+    --------
+    >>> match_jointly(np.array([[1.0, 2.0], [3.0, 9.0]]), 10)
+    (array([0, 1]), array([1, 0]))
     """
     if not cost.size:
         return np.zeros(0, int), np.zeros(0, int)
@@ -171,11 +256,12 @@ def match_jointly(cost, gate):
 
 
 MATCHERS = {"greedy": match_greedily, "joint": match_jointly}
+"""What a `Tracker.matching` stands for."""
 
 
 @dataclass(frozen=True)
 class Tracker:
-    """The choices of Sec. II, the paper's as defaults.
+    """How objects are tracked: the choices of Sec. II, the paper's as defaults.
 
     Attributes
     ----------
@@ -186,13 +272,18 @@ class Tracker:
     occlusion : str
         How an occluded object moves on: "kalman" (the paper: in a straight line) or "particles".
     gate : float
-        Largest distance between prediction and object in standard deviations of their difference; it therefore grows
-        while an object is occluded.
+        Largest distance between prediction and object in standard deviations of their difference;
+        it therefore grows while an object is occluded.
     gate_min, gate_max : float
-        The gate is never narrower or wider than this, in m: a walker may turn while out of sight, but nobody comes
-        back at the other end of the room.
+        The gate is never narrower or wider than this, in m: a walker may turn while out of sight,
+        but nobody comes back at the other end of the room.
     disappear_after : float
         Occluded for longer than this, in s, is disappeared (Sec. II: 5 seconds).
+
+    Raises
+    ------
+    ValueError
+        A choice that is not known, or a number that is not positive.
     """
 
     motion: Motion = Motion()
@@ -212,7 +303,7 @@ class Tracker:
 
 
 def track_objects(t, objects, tracker=None, visible=None, seed=0):
-    """Follow foreground objects from scan to scan.
+    """Follow foreground objects from scan to scan (Sec. II).
 
     Parameters
     ----------
@@ -223,7 +314,8 @@ def track_objects(t, objects, tracker=None, visible=None, seed=0):
     tracker : Tracker, optional
         The choices of Sec. II.
     visible : callable, optional
-        visible(i, points (M, 2)) -> (M,) bool: could the laser have seen an object there in scan i? Used by particles.
+        visible(i, points (M, 2)) -> (M,) bool: could the laser have seen an object there in scan i?
+        Used by particles.
     seed : int or Generator
         For the particles.
 
@@ -231,6 +323,16 @@ def track_objects(t, objects, tracker=None, visible=None, seed=0):
     -------
     tuple of Track
         In the order of their birth, each from its first sight until its last.
+
+    Examples
+    --------
+    Out of sight for longer than 5 s, an object is a new one:
+
+    >>> t, can, nothing = np.arange(10.0), np.array([[1.0, 2.0]]), np.zeros((0, 2))
+    >>> len(track_objects(t, [can] * 3 + [nothing] * 4 + [can] * 3))
+    1
+    >>> len(track_objects(t, [can] * 2 + [nothing] * 6 + [can] * 2))
+    2
     """
     tracker = tracker or Tracker()
     state = _Tracks(tracker, np.random.default_rng(seed))
@@ -271,7 +373,7 @@ class _Tracks:
                 self.particles[self.name[k]] = cloud
 
     def match(self, objects, now):
-        """Match predictions to `objects` (M, 2), update, let the unmatched be occluded, disappear or be born."""
+        """Match predictions to `objects` (M, 2), update, and let the unmatched go or be born."""
         tracker, motion = self.tracker, self.tracker.motion
         offset = self.means[:, None, 0] - objects[None]
         sd = np.sqrt(self.covariances[:, 0, 0] + motion.measurement_sd**2)
@@ -321,12 +423,44 @@ class _Tracks:
 
 
 def draw_particles(mean, covariance, rng, count=200):
-    """Draw `count` particles (count, n, 2) from one track's mean (n, 2) and covariance (n, n)."""
+    """Particles of one occluded track, from its normal distribution (a reconstruction).
+
+    Parameters
+    ----------
+    mean : (n, 2) float array
+        In m, m/s, m/s^2.
+    covariance : (n, n) float array
+        Shared by both axes.
+    rng : Generator
+    count : int
+        P.
+
+    Returns
+    -------
+    (P, n, 2) float array
+    """
     return mean + np.linalg.cholesky(covariance) @ rng.standard_normal((count, *mean.shape))
 
 
 def move_particles(particles, F, Q, rng, visible=None):
-    """Move particles (P, n, 2) by the motion model; those that the laser would have seen die and are redrawn."""
+    """Move particles by the motion model; those that the laser would see die (a reconstruction).
+
+    Those that have died are drawn anew from the others, unless all would have been seen.
+
+    Parameters
+    ----------
+    particles : (P, n, 2) float array
+        In m, m/s, m/s^2.
+    F, Q : (n, n) float arrays
+        From `Motion.transition`.
+    rng : Generator
+    visible : callable, optional
+        visible(points (P, 2)) -> (P,) bool: would the laser have seen an object there?
+
+    Returns
+    -------
+    (P, n, 2) float array
+    """
     moved = F @ particles + np.linalg.cholesky(Q) @ rng.standard_normal(particles.shape)
     if visible is not None:
         hidden = np.flatnonzero(~visible(moved[:, 0]))
@@ -336,19 +470,31 @@ def move_particles(particles, F, Q, rng, visible=None):
 
 
 def particle_moments(particles):
-    """Mean (n, 2) and the covariance (n, n) that both axes share, of particles (P, n, 2)."""
+    """Mean of particles, and the covariance that both axes share (a reconstruction).
+
+    Parameters
+    ----------
+    particles : (P, n, 2) float array
+        In m, m/s, m/s^2.
+
+    Returns
+    -------
+    mean : (n, 2) float array
+    covariance : (n, n) float array
+        A little more than measured, so that it is never singular.
+    """
     mean = particles.mean(axis=0)
     spread = particles - mean
     return mean, np.einsum("pia,pja->ij", spread, spread) / (2 * len(particles)) + 1e-9 * np.eye(len(mean))
 
 
 def smooth(t, measurements, motion=None):
-    """Kalman filter forwards, Rauch-Tung-Striebel smoother backwards.
+    """Kalman filter forwards, smoother backwards (Rauch, Tung and Striebel 1965).
 
     Parameters
     ----------
     t : (N,) float array
-        Seconds, increasing.
+        s, increasing.
     measurements : (N, 2) float array
         Centroids in m, `nan` where the object was occluded; the first must be finite.
     motion : Motion, optional
@@ -358,25 +504,35 @@ def smooth(t, measurements, motion=None):
     -------
     positions, velocities : (N, 2) float arrays
         m and m/s.
+
+    Examples
+    --------
+    Through a gap goes a smooth curve; a filter would go straight on, by the last velocity:
+
+    >>> t = np.arange(0.0, 3.0, 0.1)
+    >>> circle = np.column_stack([np.cos(t), np.sin(t)])
+    >>> seen = np.where((np.abs(t - 1.5) < 0.5)[:, None], np.nan, circle)
+    >>> bool(np.abs(smooth(t, seen)[0] - circle).max() < 0.05)
+    True
     """
     filtered, predicted, transitions = kalman_filter(t, measurements, motion or Motion())
     return _smooth_backwards(filtered, predicted, transitions)
 
 
 def kalman_filter(t, measurements, motion, carry_on=None):
-    """The Kalman filter of one object: from the measurements so far, never from later ones.
+    """The Kalman filter of one object, from the measurements so far only (Sec. II).
 
     Parameters
     ----------
     t : (N,) float array
-        Seconds, increasing.
+        s, increasing.
     measurements : (N, 2) float array
         Centroids in m, `nan` where the object was occluded; the first must be finite.
     motion : Motion
         The motion model.
     carry_on : callable, optional
-        carry_on(i, means, covariances, F, Q) predicts to scan i where the object was occluded; by default as the motion
-        model does.
+        carry_on(i, means, covariances, F, Q) predicts to scan i where the object was occluded; by
+        default as the motion model does.
 
     Returns
     -------
@@ -415,11 +571,12 @@ def _smooth_backwards(filtered, predicted, transitions):
 
 
 def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):
-    """Which track is the user at each moment: the fastest foreground object (Sec. II), with hysteresis.
+    """Which track is the user at each moment: the fastest foreground object (Sec. II).
 
-    Occluded objects keep their velocity, so only visible ones can become the user; who is the user already stays as
-    fast while out of sight. Another one takes over only after it has been faster by `faster` m/s for `patience` s, or
-    the choice would flicker.
+    With a hysteresis, a reconstruction: occluded objects keep their velocity, so only visible ones
+    can become the user; who is the user already stays as fast while out of sight. Another one takes
+    over only after it has been faster by `faster` m/s for `patience` s, or the choice would
+    flicker.
 
     Parameters
     ----------
@@ -457,10 +614,10 @@ def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):
 
 
 def user_track(t, tracks, users, motion=None):
-    """The user's whole trajectory: the tracks that were the user, joined and smoothed.
+    """The user's whole trajectory: the tracks that were the user, joined and smoothed (Sec. II).
 
-    Each takes over right after the one before it was last seen, so what a new track saw before it was recognised as
-    the user counts too.
+    Each takes over right after the one before it was last seen, so what a new track saw before it
+    was recognised as the user counts too.
 
     Parameters
     ----------

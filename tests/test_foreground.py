@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from dollop.foreground import (
     ForegroundGrid,
-    blob_centroids,
+    _blob_centroids,
+    _closed_up,
     bounding_boxes,
-    closed_up,
     endpoints,
     find_blobs,
     foreground_mask,
@@ -169,7 +169,7 @@ def test_blobs_are_the_connected_components(occupied):
     assert found == set(expected)
     for k in range(len(blobs)):
         inside = blobs.cells[blobs.labels == k]
-        centroid = blob_centroids(blobs.cells, blobs.labels, np.zeros(2), 0.05)[k]
+        centroid = _blob_centroids(blobs.cells, blobs.labels, np.zeros(2), 0.05)[k]
         np.testing.assert_allclose(centroid, 0.05 * (inside.mean(axis=0)[::-1] + 0.5))
         assert blobs.areas[k] == pytest.approx(len(inside) * 0.0025)
 
@@ -178,7 +178,7 @@ def test_blobs_are_the_connected_components(occupied):
 def test_closed_up_keeps_who_is_beside_whom(index):
     """Lines stay equal, neighbouring or apart as they were, and at most one in two is empty."""
     index = np.array(index)
-    closed = closed_up(index)
+    closed = _closed_up(index)
     np.testing.assert_array_equal(
         np.minimum(np.abs(closed[:, None] - closed), 2), np.minimum(np.abs(index[:, None] - index), 2)
     )
