@@ -18,7 +18,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ("dollop", "book/package.md", "pyproject.toml", "LICENSE", "MANIFEST.in")
 TESTS = ("tests", "data", "benchmarks", "pyproject.toml")
-OF_THE_CHECKOUT = ("replication", "test_book.py", "test_package.py", "test_project_files.py")
+OF_THE_CHECKOUT = (
+    "replication",
+    *("test_book.py", "test_house.py", "test_package.py", "test_project_files.py"),
+)
 PYTEST = ("-m", "pytest", "-m", "not replication", "-p", "no:cacheprovider", "-n", "2", "-q")
 WHERE = "import dollop, os; print(os.path.dirname(dollop.__file__))"
 

@@ -75,9 +75,9 @@ def test_the_wheel_holds_the_package_and_its_data_and_no_tests(wheel):
     folders = {name.split("/")[0] for name in names}
     assert folders == {"dollop", f"dollop-{dollop.__version__}.dist-info"}
     assert "dollop/lab/pioneer2dx.urdf" in names
-    code = {path.relative_to(ROOT).as_posix() for path in (ROOT / "dollop").rglob("*.py")}
-    assert code <= names
-    assert not any("test" in name or name.endswith(".gz") for name in names)
+    wanted = [path for kind in ("py", "urdf", "json") for path in (ROOT / "dollop").rglob(f"*.{kind}")]
+    assert {path.relative_to(ROOT).as_posix() for path in wanted} <= names
+    assert not any("test_" in name or name.endswith(".gz") for name in names)
 
 
 def test_the_metadata_says_what_an_index_shows(wheel):
