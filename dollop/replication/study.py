@@ -21,6 +21,7 @@ from tqdm import tqdm
 from dollop.extras import need
 from dollop.formats.files import FormatError, check_writable, whole_file
 from dollop.replication.claims import CLAIMS
+from dollop.replication.claims.observing import choose_noises
 
 __all__ = ["command"]
 
@@ -383,6 +384,8 @@ def command(options):
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "results.csv"
     check_writable(path)
+    if report_beside(folder) and not path.exists():
+        choose_noises()
     try:
         table = run_study(options.ids or list(CLAIMS), range(seeds), path, options.scheduler)
     except RuntimeError as error:

@@ -414,3 +414,54 @@ def test_golden_numbers_are_those_of_one_seed():
         "parameters": {"numbers": {"value": 44.0, "tolerance": 4.4e-5}},
         "scaled": {"off_percent": {"value": 2.0, "tolerance": 0.02}},
     }
+
+
+def test_the_noise_is_chosen_among_the_candidates(tmp_path, monkeypatch):
+    """Each model gets the one of least error, and motions have what the file says."""
+    monkeypatch.setattr(observing, "CHOSEN", tmp_path / "chosen.json")
+    models, noises = list(observing.MODELS), observing.NOISES
+    errors = np.ones((len(models), len(noises)))
+    errors[range(len(models)), range(len(models))] = [0.0] * len(models)
+    monkeypatch.setattr(observing, "errors_by_noise", lambda seed: seed * errors)
+    observing.choose_noises(seeds=(1, 2), jobs=1)
+    assert [observing.motion(name).noise for name in models] == list(noises[: len(models)])
+
+
+def test_what_is_chosen_is_kept_with_its_parameters():
+    """One noise of the candidates for each model, found on seeds that the study does not use."""
+    kept = json.loads(observing.CHOSEN.read_text())
+    assert set(kept["noises"]) == set(observing.MODELS)
+    assert set(kept["noises"].values()) <= set(observing.NOISES)
+    assert kept["parameters"]["candidates"] == list(observing.NOISES)
+    assert min(kept["parameters"]["seeds"]) >= study.SEEDS
+
+
+def test_errors_depend_on_the_noise():
+    """A seed gives every model an error at every noise, least between the ends of the range."""
+    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
+    errors = observing.errors_by_noise(10_000)
+    assert errors.shape == (len(observing.MODELS), len(observing.NOISES))
+    assert (errors.min(axis=1) < 0.9 * errors[:, [0, -1]].max(axis=1)).all()
+
+
+def test_noise_is_chosen_anew_with_the_study_itself(tmp_path, monkeypatch):
+    """Beside REPLICATION.md and without a table, and in no other case."""
+    monkeypatch.setattr(study, "run_study", lambda *_: study.as_table())
+    chosen = []
+    monkeypatch.setattr(study, "choose_noises", lambda: chosen.append(1))
+    marks = f"{study.BEGIN}\n{study.END}\n"
+    for folder, report, table, times in (
+        ("study", True, False, 1),
+        ("study", True, True, 0),
+        ("study", False, False, 0),
+        ("other", True, False, 0),
+    ):
+        chosen.clear()
+        place = tmp_path / f"{folder}-{report}-{table}" / folder
+        place.mkdir(parents=True)
+        if report:
+            (place.parent / "REPLICATION.md").write_text(marks)
+        if table:
+            study.write_table(study.as_table(), place / "results.csv")
+        main(["study", "combined", "--folder", str(place)])
+        assert len(chosen) == times

@@ -6,12 +6,15 @@ centroids of that recording. The laser sees the near side only; this constant bi
 taken out of the errors.
 """
 
+import json
 from math import inf, nan
+from pathlib import Path
 
 import joblib
 import numpy as np
 
 from dollop.foreground import near_together, seen_free
+from dollop.formats.files import whole_file
 from dollop.lab.person import smooth_path, walk
 from dollop.laser import LaserLog
 from dollop.observation import observe
@@ -30,7 +33,7 @@ from dollop.tracking import (
 )
 from dollop.trajectory import distance_to_polyline
 
-__all__ = []
+__all__ = ["choose_noises"]
 
 
 def walked(seed):
@@ -342,18 +345,17 @@ MODELS = {
 """Motion models whose noise is chosen: order, ways to hide in which it shall suit, predictor."""
 
 NOISES = tuple(float(noise) for noise in np.round(np.geomspace(0.03, 30, 13), 3))
-CHOSEN = {"velocity": 0.533, "acceleration": 0.3, "kalman": 0.3, "particles": 0.3, "blind": 0.3}
-"""What `choose_noises` found."""
+CHOSEN = Path(__file__).with_name("chosen.json")
 
 
 def motion(name):
     """The motion model of a name in `MODELS`, with the noise that was chosen for it."""
     order, _, _ = MODELS[name]
-    return Motion(order, CHOSEN[name])
+    return Motion(order, json.loads(CHOSEN.read_text())["noises"][name])
 
 
 def choose_noises(seeds=range(10_000, 10_010), jobs=-1):
-    """The noise that suits each motion model best.
+    """Choose the noise of each motion model and write it beside the code, into chosen.json.
 
     It is the spectral density with which hidden walkers are predicted best, on average over seeds
     and ways to hide: one of `NOISES`, in m^2/s^(2 order - 1). The paper tells none.
@@ -364,15 +366,13 @@ def choose_noises(seeds=range(10_000, 10_010), jobs=-1):
         None that the study uses.
     jobs : int
         Number of worker processes, -1 for one per core.
-
-    Returns
-    -------
-    dict
-        By the name of the model.
     """
     errors = joblib.Parallel(jobs)(joblib.delayed(errors_by_noise)(seed) for seed in seeds)
     best = np.sum(errors, axis=0).argmin(axis=1)
-    return {name: NOISES[k] for name, k in zip(MODELS, best, strict=True)}
+    noises = {name: NOISES[k] for name, k in zip(MODELS, best, strict=True)}
+    content = {"parameters": {"seeds": [*seeds], "candidates": NOISES}, "noises": noises}
+    with whole_file(CHOSEN, "w") as stream:
+        stream.write(json.dumps(content, indent=1) + "\n")
 
 
 def errors_by_noise(seed):
