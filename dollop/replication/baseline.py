@@ -19,16 +19,8 @@ from tqdm import tqdm
 from dollop.cdhmm import SubgoalHMM
 
 __all__ = [
-    "METHODS",
-    "TASKS",
-    "draw_demonstrations",
-    "gaussian_hmm",
-    "judge",
-    "merged",
-    "plain_mean",
-    "study",
-    "summary",
-]
+    "METHODS", "TASKS", "draw_demonstrations", "judge", "merged", "plain_mean", "study", "summary",
+]  # fmt: skip
 
 TASKS = {
     "slalom": ((0.0, 0.0), (1.5, 0.9), (3.0, -0.9), (4.5, 0.9), (6.0, -0.9), (7.5, 0.0)),
@@ -108,12 +100,13 @@ def plain_mean(sequences):
         In m.
     """
     length = int(np.median([len(sequence) for sequence in sequences]))
-    return np.mean([_stretch(np.asarray(sequence, float), length) for sequence in sequences], axis=0)
+    return np.mean([_stretch(sequence, length) for sequence in sequences], axis=0)
 
 
 def _stretch(sequence, length):
     at, given = np.linspace(0, 1, length), np.linspace(0, 1, len(sequence))
-    return np.stack([np.interp(at, given, column) for column in sequence.T], axis=-1)
+    columns = np.asarray(sequence, float).T
+    return np.stack([np.interp(at, given, column) for column in columns], axis=-1)
 
 
 def gaussian_hmm(sequences, left_to_right=False, n_states=range(2, 11), restarts=5, seed=0, spread=0.15):
@@ -165,16 +158,9 @@ def _blank(size, left_to_right, random, spread):
 
     logging.getLogger("hmmlearn").setLevel(logging.ERROR)  # it warns of every run that stops early
     allowed = np.triu(np.ones((size, size))) if left_to_right else np.ones((size, size))
-    model = GaussianHMM(
-        size,
-        covariance_type="diag",
-        covars_prior=spread**2,
-        transmat_prior=1 + 1e-3 * allowed,
-        n_iter=100,
-        random_state=random,
-        params="mct" if left_to_right else "smct",
-        init_params="mc" if left_to_right else "smct",
-    )
+    expected = {"covars_prior": spread**2, "transmat_prior": 1 + 1e-3 * allowed}
+    fitted = {"params": "mct", "init_params": "mc"} if left_to_right else {}
+    model = GaussianHMM(size, n_iter=100, random_state=random, **expected, **fitted)
     if left_to_right:
         model.startprob_ = np.eye(size)[0]
         model.transmat_ = allowed / allowed.sum(1, keepdims=True)
@@ -191,7 +177,9 @@ def _fitted(model, points, lengths):
 
 
 def _common_path(model, sequences):
-    paths = Counter(tuple(state for state, _ in groupby(model.predict(sequence))) for sequence in sequences)
+    paths = Counter()
+    for sequence in sequences:
+        paths[tuple(state for state, _ in groupby(model.predict(sequence)))] += 1
     return min(paths, key=lambda path: (-paths[path], len(path), path))
 
 
@@ -229,15 +217,16 @@ def judge(found, task):
         return {"right_number": False, "right_order": False, "error": np.nan}
     distances = np.linalg.norm(found[:, None] - task, axis=-1)
     own = np.diagonal(distances)
-    return {"right_number": True, "right_order": bool((own <= distances.min(1)).all()), "error": own.mean()}
+    in_order = bool((own <= distances.min(1)).all())
+    return {"right_number": True, "right_order": in_order, "error": own.mean()}
 
 
-def study(tasks=tuple(TASKS), numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=range(100), methods=METHODS, jobs=1):
+def study(tasks=TASKS, numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=range(100), methods=METHODS, jobs=1):
     """Let every method find every task from the same demonstrations, 30 % with a subgoal too many.
 
     Parameters
     ----------
-    tasks : sequence of str
+    tasks : iterable of str
         Names in `TASKS`.
     numbers : sequence of int
         Numbers of demonstrations.

@@ -1,4 +1,4 @@
-"""Random layouts of boxes with known truth, and how often a matching is right on them (figure x1)."""
+"""Random layouts of boxes with known truth, and how often they are matched right (Fig. x1)."""
 
 from itertools import product
 
@@ -7,13 +7,17 @@ import pandas as pd
 
 from dollop.environment import Environment
 from dollop.matching import match
+from dollop.pose import rotation
+
+__all__ = ["matching_shares", "random_layouts", "right_indices"]
 
 _CHANGES = {"none": (0, 0), "missing": (0, 1), "added": (1, 0)}
 
 
 def random_layouts(objects, generator, noise=0.05, moved=0.4, room=6.0, size=0.4, gap=0.4, change="none", turn=0.0):
-    """Boxes that stand anywhere in a room, then moved a little, and seen inexactly before and
-    after.
+    """Boxes that stand anywhere in a room, then moved a little, and seen inexactly both times.
+
+    A set-up of our own: the paper draws one layout (Fig. 8).
 
     Parameters
     ----------
@@ -42,8 +46,9 @@ def random_layouts(objects, generator, noise=0.05, moved=0.4, room=6.0, size=0.4
     """
     arrivals, departures = _CHANGES[change]
     total = objects + arrivals
-    old = _apart(lambda: generator.uniform(size / 2, room - size / 2, (total, 2)), size + gap)
-    new = _apart(lambda: _turned(old, turn) + generator.normal(0, moved, (total, 2)), size + gap)
+    shape, distance = (total, 2), size + gap
+    old = _apart(lambda: generator.uniform(size / 2, room - size / 2, shape), distance)
+    new = _apart(lambda: _turned(old, turn) + generator.normal(0, moved, shape), distance)
     old, order = old[:objects], generator.permutation(total)[departures:]
     places = np.full(total, -1)
     places[order] = np.arange(len(order))
@@ -52,18 +57,17 @@ def random_layouts(objects, generator, noise=0.05, moved=0.4, room=6.0, size=0.4
 
 
 def _apart(draw, distance):
-    """Positions (N, 2) drawn again until no two are nearer than `distance` in both x and y."""
+    """Positions (N, 2), drawn anew until no two are nearer than `distance` in both x and y."""
     while True:
         positions = draw()
-        distances = np.abs(positions - positions[:, None]).max(axis=2) + distance * np.eye(len(positions))
-        if distances.min() >= distance:
+        distances = np.abs(positions - positions[:, None]).max(axis=2)
+        if (distances + distance * np.eye(len(positions))).min() >= distance:
             return positions
 
 
 def _turned(positions, turn):
-    cos, sin = np.cos(turn), np.sin(turn)
     middle = positions.mean(axis=0)
-    return middle + (positions - middle) @ np.array([[cos, sin], [-sin, cos]])
+    return middle + (positions - middle) @ rotation(turn).T
 
 
 def _seen(centres, size, noise, generator):
@@ -72,18 +76,28 @@ def _seen(centres, size, noise, generator):
 
 
 def right_indices(partners, turn=0.0):
-    """(4N,) true indices of the corners, given the true partner of each object and the layout's
-    turn in rad.
+    """The right answer of a matching, corner by corner.
+
+    Parameters
+    ----------
+    partners : (N,) int array
+        Which object each one truly is afterwards, -1 where it is missing.
+    turn : float
+        By how much the layout was turned, in rad.
+
+    Returns
+    -------
+    (4N,) int array
+        As `Matching.indices`.
     """
     corners = (np.arange(4) + round(turn / (np.pi / 2))) % 4
     return np.where(partners[:, None] >= 0, 4 * partners[:, None] + corners, -1).ravel()
 
 
 def matching_shares(
-    objects=(2, 3, 4), noises=(0.0, 0.05, 0.1, 0.2), changes=("none",), layouts=300, seed=0, turn=0.0, **properties
+    objects=(2, 3, 4), noises=(0.0, 0.05, 0.1, 0.2), changes=("none",), layouts=300, seed=0, **properties
 ):
-    """How often the corners are matched right, by method, number of objects and box noise (figure
-    x1).
+    """How often the corners are matched right, by method, number and box noise (Fig. x1).
 
     Parameters
     ----------
@@ -93,10 +107,8 @@ def matching_shares(
         Random layouts per combination; the two methods see the same ones.
     seed : int
         Seed of the random layouts.
-    turn : float
-        The layout is also turned by this much, in rad.
     **properties
-        Further ones of `random_layouts`, such as moved and gap.
+        Further ones of `random_layouts`, such as moved, gap and turn.
 
     Returns
     -------
@@ -109,11 +121,11 @@ def matching_shares(
     rows = []
     for change, n, noise in product(changes, objects, noises):
         generator = np.random.default_rng(seed)
-        wanted = properties | {"noise": noise, "change": change, "turn": turn}
-        drawn = [random_layouts(n, generator, **wanted) for _ in range(layouts)]
+        case = {"change": change, "noise": noise}
+        drawn = [random_layouts(n, generator, **properties, **case) for _ in range(layouts)]
         for method in ("literal", "robust") if change == "none" else ("robust",):
-            shares = _shares(drawn, method, turn)
-            rows.append({"change": change, "objects": n, "noise": noise, "method": method, **shares})
+            shares = _shares(drawn, method, properties.get("turn", 0.0))
+            rows.append(case | {"objects": n, "method": method} | shares)
     return pd.DataFrame(rows)
 
 

@@ -1,4 +1,7 @@
-"""Merging beside hidden Markov models and the plain mean: the demonstrations drawn, the judge, the outcome."""
+"""Merging beside hidden Markov models and the plain mean.
+
+The demonstrations drawn, the judge, the outcome.
+"""
 
 import numpy as np
 import pytest
@@ -20,7 +23,7 @@ QUICK = {"merging": merged, "plain mean": plain_mean}
 
 
 def test_demonstrations_scatter_as_told():
-    """Without odd subgoals, the drawn ones have the task as their mean and the spread as their deviation."""
+    """Without odd subgoals, the drawn ones have the task as mean, the spread as deviation."""
     drawn = np.array(draw_demonstrations(SLALOM, 2000, 0.15, extra=0))
     assert np.allclose(drawn.mean(0), SLALOM, atol=0.02)
     assert np.allclose(drawn.std(0), 0.15, atol=0.01)
@@ -43,7 +46,10 @@ def test_the_same_seed_draws_the_same():
 
 
 def test_judge_knows_number_order_and_error():
-    """A wrong number has no error; two subgoals exchanged are out of order; a crossing met twice is no exchange."""
+    """A wrong number has no error; two subgoals exchanged are out of order.
+
+    A crossing met twice is no exchange.
+    """
     assert judge(SLALOM[:5], SLALOM)["right_number"] is False
     assert np.isnan(judge(SLALOM[:5], SLALOM)["error"])
     assert judge(SLALOM[[0, 2, 1, 3, 4, 5]], SLALOM)["right_order"] is False
@@ -67,7 +73,10 @@ def test_hidden_markov_model_finds_what_is_plain(left_to_right):
 
 
 def test_study_compares_all_methods_on_the_same_demonstrations():
-    """Every method judges every case once; on two demonstrations merging is right more often than the plain mean."""
+    """Every method judges every case once.
+
+    On two demonstrations merging is right more often than the plain mean.
+    """
     table = study(tasks=("slalom",), numbers=(2,), spreads=(0.15,), seeds=range(25), methods=QUICK)
     shares = summary(table).loc[("slalom", 0.15, 2)]
     assert len(table) == 50

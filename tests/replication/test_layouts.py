@@ -9,7 +9,10 @@ from dollop.replication.layouts import matching_shares, random_layouts, right_in
 
 @pytest.mark.parametrize(("change", "counts"), [("none", (3, 3)), ("missing", (3, 2)), ("added", (3, 4))])
 def test_the_truth_says_which_object_is_which(change, counts):
-    """Objects that do not move at all stand where their partners stand; one is without where one is missing."""
+    """Objects that do not move at all stand where their partners stand.
+
+    One is without where one is missing.
+    """
     before, after, partners = random_layouts(3, np.random.default_rng(2), noise=0, moved=0, change=change)
     assert (len(before), len(after)) == counts
     kept = partners >= 0
@@ -18,7 +21,10 @@ def test_the_truth_says_which_object_is_which(change, counts):
 
 
 def test_both_layouts_keep_room_size_and_gap():
-    """Before and after, boxes are as large as stated but for the noise, and apart; before, they lie in the room."""
+    """Before and after, boxes are as large as stated but for the noise, and apart.
+
+    Before, they lie in the room.
+    """
     rng = np.random.default_rng(1)
     extents = []
     for _ in range(60):
@@ -33,7 +39,7 @@ def test_both_layouts_keep_room_size_and_gap():
 
 
 def test_objects_move_by_the_stated_standard_deviation():
-    """Moves have the standard deviation asked for per axis and no bias, and either object may come first."""
+    """Moves have the standard deviation asked for and no bias; either object may come first."""
     rng, moves, first = np.random.default_rng(5), [], []
     for _ in range(300):
         before, after, partners = random_layouts(2, rng, noise=0, moved=0.4, room=20.0)
@@ -46,7 +52,7 @@ def test_objects_move_by_the_stated_standard_deviation():
 
 @pytest.mark.parametrize("quarters", [0, 1, 2, -1])
 def test_a_turned_layout_is_turned_corner_by_corner(quarters):
-    """Turned about its middle and not moved otherwise: each corner lands on the one that the true indices name."""
+    """Turned about its middle, each corner lands on the one that the true indices name."""
     turn = quarters * np.pi / 2
     before, after, partners = random_layouts(4, np.random.default_rng(3), noise=0, moved=0, turn=turn)
     z = before.corners @ (1, 1j)
@@ -55,7 +61,10 @@ def test_a_turned_layout_is_turned_corner_by_corner(quarters):
 
 
 def test_shares_are_what_counting_gives():
-    """Every column of the study equals counting layout by layout; only the robust method meets a missing object."""
+    """Every column of the study equals counting layout by layout.
+
+    Only the robust method meets a missing object.
+    """
     drawn, wanted = 40, {"noise": 0.05, "moved": 0.6}
     study = matching_shares((3,), (0.05,), ("none", "missing"), drawn, seed=9, turn=np.pi / 2, moved=0.6)
     assert study[["change", "method"]].values.tolist() == [
@@ -79,7 +88,7 @@ def test_shares_are_what_counting_gives():
 
 
 def test_the_same_seed_gives_the_same_shares():
-    """The study is a function of its seed, and the literal method gets worse with box noise, the robust one not."""
+    """Shares are a function of the seed; the literal method gets worse with noise, robust not."""
     study = matching_shares(objects=(2,), noises=(0.0, 0.1), layouts=40, seed=4)
     assert study.equals(matching_shares(objects=(2,), noises=(0.0, 0.1), layouts=40, seed=4))
     shares = study.pivot(index="noise", columns="method", values="right")

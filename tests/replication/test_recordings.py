@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from places import ROOT
 
 import dollop
 from dollop.replication import recordings
@@ -19,7 +20,7 @@ def test_sides_are_told_by_the_way_walked():
 
 @pytest.mark.parametrize("turn", [0, 30, 90, -120, 170])
 def test_a_corner_is_the_angle_between_the_ways_to_and_from_a_subgoal(turn):
-    """Two straight segments: the corner is the turn between them, whichever way, but for the last centimetre."""
+    """Of two straight segments it is the turn between them, but for the last centimetre."""
     away = 2 * np.array([np.cos(np.radians(turn)), np.sin(np.radians(turn))])
     ways = np.linspace([0.0, 0.0], [2.0, 0.0], 40), [2.0, 0.0] + np.linspace([0.0, 0.0], away, 40)
     law = dollop.SequencedLDS(tuple(dollop.LDS.fit(way) for way in ways), ways[0][0], np.ones(2))
@@ -36,6 +37,21 @@ def test_the_largest_of_the_corners_counts_and_one_segment_has_none():
     assert recordings.largest_corner(one) == 0
 
 
+def test_the_data_are_what_save_all_writes(tmp_path):
+    """Made anew from the seed, every recording is the committed one, to the last digit kept."""
+    pytest.importorskip("pybullet")
+    folders = tmp_path / "made", ROOT / "data"
+    names = recordings.save_all(folders[0])
+    made, kept = ({path.name for path in folder.iterdir()} for folder in folders)
+    assert made == kept - {"README.md"}
+    for name in set(names) - {"lab"}:
+        made, kept = (dollop.read_log(folder / f"{name}.log.gz") for folder in folders)
+        np.testing.assert_allclose(made.ranges, kept.ranges, atol=0.0011)
+        np.testing.assert_allclose(made.poses, kept.poses, atol=2e-6)
+    made, kept = (dollop.OccupancyGrid.load(folder / "lab.yaml") for folder in folders)
+    assert (made.occupied == kept.occupied).mean() > 0.999
+
+
 def test_starts_lie_round_the_beginning():
     """Starts scatter by 0.15 m and 20 degrees round the law's start, heading along it."""
     pytest.importorskip("pybullet")
@@ -46,7 +62,7 @@ def test_starts_lie_round_the_beginning():
 
 
 def test_the_laser_sees_boxes_that_only_the_robust_method_matches():
-    """Boxes as the laser sees them: the robust matching right in nearly all layouts, the literal one in few."""
+    """As the laser sees them: robust is right in nearly all layouts, literal in few."""
     pytest.importorskip("pybullet")
     shares = recordings.matchings_from_laser("cans", count=15)
     assert shares["robust"] >= 0.9 and shares["literal"] <= 0.6
