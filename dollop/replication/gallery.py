@@ -1,13 +1,13 @@
 """The gallery: every panel with its caption, what to look at, and its numbers, as one page.
 
 Captions and looks stand with the drawings (`dollop.replication.figures`); here are the words and
-units of the numbers. Captions carry no measured numbers: those come from metrics.json, so
-that they cannot drift apart.
+units of the numbers. Captions carry no measured numbers: those come from metrics.json, so that they
+cannot drift apart.
 """
 
 __all__ = ["NAMES", "page"]
 
-NAMES = {  # name in metrics.json, without the beginning that says of what: words, and the unit
+NAMES = {
     "beams": ("beams", ""),
     "returns": ("beams that came back", ""),
     "track_error_mean_m": ("track error, mean", "m"),
@@ -51,13 +51,14 @@ NAMES = {  # name in metrics.json, without the beginning that says of what: word
     "exponent": ("error falls with the number to the power of", ""),
     "error_by_expected": ("error, as a share of the expected one", ""),
 }
+"""Words and unit of each name in metrics.json, without the beginning that says of what."""
 
 HEAD = """\
 # The figures
 
-Every panel, drawn by `make figures` from nothing but seeds, with its caption, what to look at, and the numbers behind
-it. This page is written by the same command, from [metrics.json](metrics.json). Names of panels are the paper's; those
-that begin with x are not in the paper.
+Every panel, drawn by `make figures` from nothing but seeds, with its caption, what to look at, and
+the numbers behind it. This page is written by the same command, from [metrics.json](metrics.json).
+Names of panels are the paper's; those that begin with x are not in the paper.
 """
 
 
@@ -99,40 +100,36 @@ def table(numbers, columns):
     """Numbers as a Markdown table, a column for each thing that they are of.
 
     >>> print(table({"mean_error_m": 0.013071, "n_segments": 6}, {}))
-    | | |
-    |---|---|
+    |  |  |
+    | --- | --- |
     | mean error of the law | 13 mm |
     | segments, an LDS each | 6 |
-    >>> print(table({"runs": 5, "plain_finished": 4, "own_finished": 5}, {"plain": "plain law", "own": "going round"}))
-    | | plain law | going round |
-    |---|---|---|
+    >>> numbers = {"runs": 5, "plain_finished": 4, "own_finished": 5}
+    >>> print(table(numbers, {"plain": "plain law", "own": "going round"}))
+    |  | plain law | going round |
+    | --- | --- | --- |
     | runs | 5 | 5 |
     | runs that finished | 4 | 5 |
     """
     names = dict.fromkeys(name_of(key, columns) for key in numbers)
-    lines = [["", *(columns or {"": ""}).values()], ["---"] * (len(columns or " ") + 1)]
+    columns = columns or {"": ""}
+    lines = [["", *columns.values()], ["---"] * (len(columns) + 1)]
     for name in names:
         words, unit = NAMES[name]
-        values = [of_what(numbers, column, name) for column in columns or [""]]
-        lines.append([words, *(quantity(value, unit) for value in values)])
-    return "\n".join(line(cells) for cells in lines)
+        lines.append([words, *(quantity(of_what(numbers, end, name), unit) for end in columns)])
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 def of_what(numbers, column, name):
     """The number of this name that is the column's own, else what is told of all, else no number.
 
     >>> numbers = {"cost": 1.8, "literal_cost": 28268, "own_finished": 10}
-    >>> of_what(numbers, "literal", "cost"), of_what(numbers, "robust", "cost"), of_what(numbers, "plain", "finished")
-    (28268, 1.8, '')
+    >>> of_what(numbers, "literal", "cost"), of_what(numbers, "robust", "cost")
+    (28268, 1.8)
+    >>> of_what(numbers, "plain", "finished")
+    ''
     """
     return numbers.get(f"{column}_{name}", numbers.get(name, ""))
-
-
-def line(cells):
-    """One line of a Markdown table."""
-    if set(cells) == {"---"}:
-        return "|" + "|".join(cells) + "|"
-    return "|" + "|".join(f" {cell} " if cell else " " for cell in cells) + "|"
 
 
 def name_of(key, columns):
@@ -159,12 +156,10 @@ def quantity(value, unit=""):
     >>> quantity(8.421228, "s"), quantity(1.2, "m"), quantity(0.98)
     ('8.4 s', '1.20 m', '0.98')
     """
-    if value is None:
-        return "none"
+    if value is None or value == "":
+        return "none" if value is None else ""
     if isinstance(value, list):
         return " ".join(map(str, value))
-    if value == "":
-        return ""
     if unit == "m":
         return f"{1000 * value:.0f} mm" if abs(value) < 1 else f"{value:.2f} m"
     if unit:

@@ -1,15 +1,16 @@
-"""The figure script: fresh numbers agree with the committed ones, and bad calls end with a message."""
+"""The figure script: fresh numbers agree with the committed ones, bad calls end in a message."""
 
 import json
-import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from places import ROOT
 
+import dollop
 from dollop.replication import baseline, figures, recordings
-from dollop.replication.figures.runs import CONTROLS, numbers
+from dollop.replication.figures.controls import CONTROLS, numbers
+from dollop.replication.figures.performing import law_numbers
 from dollop.replication.layouts import matching_shares
 from dollop.replication.runs import distances_to_law
 
@@ -59,18 +60,22 @@ def test_observing_and_segmenting_are_in_their_bands():
 
 
 def test_performing_is_in_its_bands():
-    """Fig. 7: all runs finish near the law and touch nothing; kidnapped, only plain hits something."""
+    """Fig. 7: all runs finish near the law and touch nothing.
+
+    Kidnapped, only plain hits something.
+    """
     runs, kidnapped = COMMITTED["7a"], COMMITTED["7b"]
     for kind, farthest in (("plain", 0.080), ("own", 0.040)):
         assert runs[f"{kind}_finished"] == runs["runs"] == 10 and runs[f"{kind}_collisions"] == 0
         assert runs[f"{kind}_mean_distance_m"] <= farthest
-        assert runs[f"{kind}_localisation_error_m"] <= 0.05 and runs[f"{kind}_localisation_error_deg"] <= 3
+        assert runs[f"{kind}_localisation_error_m"] <= 0.05
+        assert runs[f"{kind}_localisation_error_deg"] <= 3
     assert kidnapped["own_finished"] == kidnapped["runs"] == 5
     assert kidnapped["plain_runs_with_collision"] > kidnapped["own_runs_with_collision"] == 0
 
 
 def test_moved_objects_are_in_their_bands():
-    """Figs 10 and x1: three layouts matched right, all runs finish; robust matching right where the literal is not."""
+    """Figs 10 and x1: all matched right, all runs finish; robust is right where literal is not."""
     assert COMMITTED["10a"]["matching_right"] == COMMITTED["10b"]["matching_right"] == 3
     assert COMMITTED["10b"]["own_finished"] == COMMITTED["10b"]["runs"] == 30
     assert COMMITTED["10b"]["own_collisions"] == 0
@@ -81,8 +86,12 @@ def test_moved_objects_are_in_their_bands():
 
 
 def test_learning_is_in_its_bands():
-    """Figs 12 and x2: runs finish on the demonstrated side, where the plain law hits; merging is right from two on."""
-    assert COMMITTED["12a"]["path_length"] <= COMMITTED["12a"]["states_after"] < COMMITTED["12a"]["states_before"]
+    """Figs 12 and x2: runs finish on the demonstrated side, where the plain law hits.
+
+    Merging is right from two on.
+    """
+    model = COMMITTED["12a"]
+    assert model["path_length"] <= model["states_after"] < model["states_before"]
     runs = COMMITTED["12b"]
     assert runs["own_finished"] == runs["own_passed_on_the_demonstrated_side"] == runs["runs"] == 10
     assert runs["own_collisions"] == 0 and runs["plain_runs_with_collision"] >= 5
@@ -92,25 +101,43 @@ def test_learning_is_in_its_bands():
     assert shares["hmm_seeds"] == shares["left_to_right_seeds"] >= 12
 
 
+def test_the_notebooks_tell_the_error_of_figure_6b():
+    """What notebooks 00 and 04 measure on data/ is the figure's number, by the same definition.
+
+    Not to the last digit: the log keeps the sensor's heading to a microradian, which puts beams
+    that run along a border of cells on its other side, and with it the track by up to a centimetre.
+    """
+    log = dollop.read_log(ROOT / "data" / "figure_eights.log.gz")
+    background = dollop.OccupancyGrid.load(ROOT / "data" / "lab.yaml")
+    user = dollop.observe(log, background).user
+    laps = dollop.laps(user.t, user.positions)
+    told = law_numbers(dollop.SequencedLDS.fit(laps), laps)
+    assert told["n_segments"] == COMMITTED["6b"]["n_segments"]
+    assert told["mean_error_m"] == pytest.approx(COMMITTED["6b"]["mean_error_m"], abs=0.0015)
+
+
 def test_corners_are_told_for_the_law_that_the_runs_follow():
     """Adapting turns a law's corners; the law of Figure 10a is that of Figure 10b."""
-    corners = {panel: COMMITTED[panel]["largest_corner_deg"] for panel in ("6b", "10a", "10b", "12b")}
+    told = ("6b", "10a", "10b", "12b")
+    corners = {panel: COMMITTED[panel]["largest_corner_deg"] for panel in told}
     assert corners["10a"] == corners["10b"] > corners["6b"] > 0
     assert 0 < corners["12b"] < 180
 
 
 def test_numbers_are_named_after_the_kind_of_control():
-    """Counts of each kind with the kind before the name, the number of runs once; contacts are not runs with one."""
+    """Counts with the kind before the name, runs once; contacts are not runs with a contact."""
 
     def run(finished, collisions):
-        return SimpleNamespace(finished=finished, collisions=collisions, clearance=np.array([0.3, 0.1 - collisions]))
+        clearance = np.array([0.3, 0.1 - collisions])
+        return SimpleNamespace(finished=finished, collisions=collisions, clearance=clearance)
 
-    found = numbers({"plain": [run(True, 2), run(False, 1)], "own": [run(True, 0)] * 2}, lambda runs: {"n": len(runs)})
-    plain = {"finished": 1, "collisions": 3, "runs_with_collision": 2, "min_clearance_m": -1.9, "n": 2}
-    own = {"finished": 2, "collisions": 0, "runs_with_collision": 0, "min_clearance_m": 0.1, "n": 2}
-    expected = {f"plain_{key}": value for key, value in plain.items()}
-    expected |= {f"own_{key}": value for key, value in own.items()}
-    assert found == {"runs": 2} | expected
+    runs_of = {"plain": [run(True, 2), run(False, 1)], "own": [run(True, 0), run(True, 0)]}
+    found = numbers(runs_of, lambda runs: {"n": len(runs)})
+    assert found.pop("runs") == found.pop("plain_n") == found.pop("own_n") == 2
+    names = "finished", "collisions", "runs_with_collision", "min_clearance_m"
+    assert [found.pop(f"plain_{name}") for name in names] == [1, 3, 2, -1.9]
+    assert [found.pop(f"own_{name}") for name in names] == [2, 0, 0, 0.1]
+    assert not found
 
 
 def test_unknown_figures_are_named_with_the_known_ones(capsys):
@@ -121,12 +148,10 @@ def test_unknown_figures_are_named_with_the_known_ones(capsys):
 
 
 def test_without_pybullet_the_figures_say_how_to_get_it(tmp_path, monkeypatch):
-    """The message names the extra to install; there is no traceback, and nothing is half-written."""
-    monkeypatch.setitem(sys.modules, "pybullet", None)
-    monkeypatch.delitem(sys.modules, "dollop.lab.world", raising=False)
-    monkeypatch.delitem(sys.modules, "dollop.lab.render", raising=False)
-    with pytest.raises(SystemExit, match=r"pip install .dollop\[lab\]"):
-        figures.main(["1", "--folder", str(tmp_path)])
+    """The error names the extra to install, before anything is written."""
+    monkeypatch.setattr("dollop.extras.find_spec", lambda name: None)
+    with pytest.raises(ImportError, match=r"pip install .dollop\[lab\]"):
+        figures.main(["2", "--folder", str(tmp_path)])
     assert list(tmp_path.iterdir()) == []
 
 
@@ -143,7 +168,7 @@ def test_a_folder_that_cannot_be_made_is_said_before_the_work(tmp_path, capsys):
 
 @pytest.mark.usefixtures("lab")
 def test_fresh_runs_are_as_near_to_the_law_as_in_figure_7a():
-    """Two of its runs: finished, nothing touched, as near to the response on average within 15 mm."""
+    """Two of its runs: finished, nothing touched, as near to the response within 15 mm."""
     law = recordings.figure_eight_task().law
     for kind, (_, choices) in CONTROLS.items():
         runs = recordings.eight_runs(*choices, count=2)
@@ -156,12 +181,13 @@ def test_fresh_runs_are_as_near_to_the_law_as_in_figure_7a():
 def test_a_fresh_kidnapped_run_goes_round_obstacles_as_in_figure_7b():
     """One of its kind: it finds itself again, finishes and touches nothing."""
     (run,) = recordings.kidnapped_runs(count=1)
-    assert run.finished and not run.collisions and len(run.kidnapped) == 1 and not run.localised.all()
+    assert run.finished and not run.collisions
+    assert len(run.kidnapped) == 1 and not run.localised.all()
 
 
 @pytest.mark.usefixtures("lab")
 def test_fresh_runs_among_moved_cans_finish_as_in_figure_10b():
-    """One run in a layout: finished, nothing touched, no nearer than the figure's nearest within 10 cm."""
+    """One run in a layout: finished, nothing touched, as clear as the figure's within 10 cm."""
     (run,) = recordings.moved_runs(0, count=1)
     assert run.finished and not run.collisions
     assert run.clearance.min() > COMMITTED["10b"]["own_min_clearance_m"] - 0.1
@@ -179,16 +205,17 @@ def test_fresh_runs_of_the_slalom_pass_the_cones_as_in_figure_12b():
 
 @pytest.mark.usefixtures("lab")
 def test_fresh_layouts_are_matched_as_often_as_in_figure_x1():
-    """Of sixty layouts of each number of objects about the committed share, both methods; of ten seen by the laser."""
+    """Of sixty random layouts, and of ten seen by the laser, about the committed share."""
     for row in matching_shares(noises=(0.05,), layouts=60, seed=1).itertuples():
-        assert row.right == pytest.approx(COMMITTED["x1"][f"{row.method}_{row.objects}_objects"], abs=0.2)
+        committed = COMMITTED["x1"][f"{row.method}_{row.objects}_objects"]
+        assert row.right == pytest.approx(committed, abs=0.2)
     for kind in ("cans", "cones"):
         for method, share in recordings.matchings_from_laser(kind, count=10).items():
             assert share == pytest.approx(COMMITTED["x1"][f"{method}_{kind}_seen"], abs=0.4)
 
 
 def test_fresh_demonstrations_are_merged_as_well_as_in_figure_x2():
-    """Ten seeds: merging finds number and order and is as near within a quarter; the others as often within a third."""
+    """Ten seeds: merging is as near within a quarter, the others as often right within a third."""
     quick = {method: baseline.METHODS[method] for method in ("merging", "plain mean")}
     ten = baseline.summary(baseline.study(("slalom",), (2, 5), (0.15,), range(100, 110), quick))
     for n in (2, 5):

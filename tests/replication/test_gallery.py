@@ -13,7 +13,7 @@ METRICS = json.loads((FOLDER / "metrics.json").read_text())
 
 
 def test_every_panel_has_a_caption_and_a_look_in_the_papers_order():
-    """What a drawing's docstring says is on the page; the names are in the order of metrics.json."""
+    """No panel is without a caption or a look; they are in the order of metrics.json."""
     assert list(FIGURES) == list(METRICS)
     for panel in FIGURES.values():
         assert panel.caption.endswith(".") and panel.look.endswith("."), panel.id
@@ -33,7 +33,7 @@ def test_every_picture_on_the_page_exists():
 
 
 def test_captions_carry_no_measured_numbers():
-    """A length in millimetres beside a panel comes from metrics.json, save for what the paper itself reports."""
+    """Millimetres beside a panel come from metrics.json, save for what the paper reports."""
     for panel in FIGURES.values():
         text = panel.caption + panel.look.replace("The paper: 6 LDS, 20 mm on average.", "")
         assert " mm" not in text, panel.id
@@ -61,12 +61,15 @@ def test_panels_without_numbers_are_left_out():
     ],
 )
 def test_a_number_is_written_with_its_unit(value, unit, expected):
-    """Metres below one become millimetres, the rest keeps its unit; counts stay whole; what never happened is none."""
+    """Metres below one become millimetres, the rest keeps its unit; counts stay whole.
+
+    What never happened is none.
+    """
     assert gallery.quantity(value, unit) == expected
 
 
 def test_every_number_has_words_and_the_unit_that_its_name_ends_in():
-    """A key of metrics.json without words cannot be added, nor one whose unit is not what it says."""
+    """No key of metrics.json is without words, or in a unit that is not what it says."""
     units = {"m": "m", "s": "s", "deg": "°"}
     for panel, numbers in METRICS.items():
         for key in numbers:
@@ -77,11 +80,13 @@ def test_every_number_has_words_and_the_unit_that_its_name_ends_in():
 
 def test_no_words_are_for_nothing():
     """Every name is that of a number, every column has numbers, and no two names read alike."""
-    used = {gallery.name_of(key, FIGURES[id].columns) for id, numbers in METRICS.items() for key in numbers}
-    assert used == set(gallery.NAMES)
+    used = set()
     for panel in FIGURES.values():
-        for column in panel.columns.keys() - {"robust"}:  # Figures 8 and 9 tell of it what has no beginning
-            assert any(key.startswith(f"{column}_") for key in METRICS[panel.id]), (panel.id, column)
+        keys = METRICS[panel.id]
+        used |= {gallery.name_of(key, panel.columns) for key in keys}
+        for column in panel.columns.keys() - {"robust"}:  # in Figures 8 and 9 it has no beginning
+            assert any(key.startswith(f"{column}_") for key in keys), (panel.id, column)
+    assert used == set(gallery.NAMES)
     assert len({words for words, _ in gallery.NAMES.values()}) == len(gallery.NAMES)
 
 

@@ -1,6 +1,6 @@
 """Every numbered figure of the paper, regenerated: python -m dollop.figures [id ...].
 
-Each figure is one function that returns the drawing and its numbers, in the modules named after
+Each panel is one function that returns the drawing and its numbers, in the modules named after
 what they show. This one writes a PNG per panel, keeps the numbers in metrics.json, and lays both
 out as a gallery.
 """
@@ -14,20 +14,23 @@ import matplotlib.pyplot as plt
 from tqdm import tqdm
 
 from dollop import plot
+from dollop.extras import need
 from dollop.formats.files import check_writable, whole_file
 from dollop.replication import gallery
-from dollop.replication.figures import environment, learning, observing, performing  # noqa: F401, they register
+from dollop.replication.figures import environment, learning, observing, performing  # noqa: F401
 from dollop.replication.figures.panel import PANELS
 
 __all__ = ["FIGURES", "main", "make"]
 
 FIGURES = {each.id: each for each in sorted(PANELS.values(), key=lambda each: each.picture)}
-"""Every panel by id, in the paper's order."""
+"""Every panel by id, in the paper's order; the modules above register theirs when imported."""
+
+DESCRIPTION = "Make the figures named by id, or all."
 
 
-def rounded(metrics):
-    """Numbers to six decimals: what is beyond differs between processors."""
-    return {key: round(value, 6) if isinstance(value, float) else value for key, value in metrics.items()}
+def rounded(value):
+    """A number to six decimals: what is beyond differs between processors."""
+    return round(value, 6) if isinstance(value, float) else value
 
 
 def make(id, folder):
@@ -51,39 +54,51 @@ def make(id, folder):
         with whole_file(folder / panel.picture) as stream:
             figure.savefig(stream, format="png", metadata={"Software": None})
         plt.close(figure)
-    return rounded(json.loads(json.dumps(metrics, default=float)))
+    plain = json.loads(json.dumps(metrics, default=float))
+    return {name: rounded(value) for name, value in plain.items()}
 
 
 def main(arguments=None):
-    """Command line: make the figures named by id, or all."""
-    parser = argparse.ArgumentParser(prog="python -m dollop.figures", description=main.__doc__)
-    parser.add_argument("ids", nargs="*", metavar="id", help=f"any of {', '.join(FIGURES)}; all when none is given")
-    parser.add_argument("--folder", type=Path, default=Path("figures"), help="where to write (default: figures)")
+    """Make the figures named by id, or all; the command line of `python -m dollop.figures`.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        By default those that the program was called with.
+
+    Raises
+    ------
+    SystemExit
+        An unknown id, or a folder that cannot be written to: told before the work.
+    ImportError
+        PyBullet is missing: told before the work as well.
+    """
+    parser = argparse.ArgumentParser(prog="python -m dollop.figures", description=DESCRIPTION)
+    known = ", ".join(FIGURES)
+    parser.add_argument("ids", nargs="*", metavar="id", help=f"any of {known}; default: all")
+    parser.add_argument("--folder", type=Path, default=Path("figures"), help="default: figures")
     options = parser.parse_args(arguments)
-    unknown = [panel for panel in options.ids if panel not in FIGURES]
+    folder, panels = options.folder, options.ids or list(FIGURES)
+    unknown = [id for id in panels if id not in FIGURES]
     if unknown:
-        parser.error(f"no figure {', '.join(unknown)}; known: {', '.join(FIGURES)}")
-    written = options.folder / "metrics.json"
+        parser.error(f"no figure {', '.join(unknown)}; known: {known}")
+    need("lab")
     try:
-        options.folder.mkdir(parents=True, exist_ok=True)
-        check_writable(written)
+        folder.mkdir(parents=True, exist_ok=True)
+        check_writable(folder / "metrics.json")
     except OSError as error:
-        parser.error(f"the folder {options.folder} cannot be written to: {error}")
-    metrics = json.loads(written.read_text()) if written.exists() else {}
-    panels = options.ids or list(FIGURES)
-    try:
-        for panel in tqdm(panels, desc="figures", unit="panel", file=sys.stderr):
-            metrics[panel] = make(panel, options.folder)
-    except ImportError as error:
-        sys.exit(f"figures: {error}")
-    metrics = {panel: metrics[panel] for panel in FIGURES if panel in metrics}
+        parser.error(f"the folder {folder} cannot be written to: {error}")
+    made = tqdm(panels, desc="figures", unit="panel", file=sys.stderr)
+    write_numbers(folder, {id: make(id, folder) for id in made})
+    print(f"wrote {len(panels)} panels, metrics.json and the gallery README.md into {folder}/")
+
+
+def write_numbers(folder, fresh):
+    """Write metrics.json, with fresh numbers beside those that stand in it, and the gallery."""
+    written = folder / "metrics.json"
+    numbers = (json.loads(written.read_text()) if written.exists() else {}) | fresh
+    numbers = {id: numbers[id] for id in FIGURES if id in numbers}
     with whole_file(written, "w") as stream:
-        json.dump(metrics, stream, indent=1)
-        stream.write("\n")
-    with whole_file(options.folder / "README.md", "w") as stream:
-        stream.write(gallery.page(FIGURES.values(), metrics))
-    print(f"wrote {len(panels)} panels, metrics.json and the gallery README.md into {options.folder}/")
-
-
-if __name__ == "__main__":
-    main()
+        stream.write(json.dumps(numbers, indent=1) + "\n")
+    with whole_file(folder / "README.md", "w") as stream:
+        stream.write(gallery.page(FIGURES.values(), numbers))

@@ -9,14 +9,15 @@ from dollop import plot
 from dollop.environment import Environment, spring_constants, spring_forces
 from dollop.matching import match
 from dollop.replication import recordings
+from dollop.replication.figures.controls import COLUMNS, CONTROLS, at_once, by_kind, draw_runs, numbers
 from dollop.replication.figures.panel import panel
-from dollop.replication.figures.runs import COLUMNS, CONTROLS, at_once, draw_runs, numbers, runs_by_kind
 from dollop.replication.layouts import matching_shares
 
 NEAR = 0.11  # m, how far a label stands off its corner in the drawing
-ASIDE = 1.0, -2.2  # m, by which Fig. 8 draws the boxes of now aside, so that no two lines lie on each other
+ASIDE = 1.0, -2.2  # m, by which Fig. 8 draws the boxes of now aside, so that lines lie apart
 WIDE = 10  # inches, figures of three panels
 NOISES = 0.0, 0.025, 0.05, 0.1, 0.15, 0.2  # m, in figure x1
+LAYOUTS = range(len(recordings.LAYOUTS))
 
 
 @panel("8", robust="robust", literal="literal")
@@ -42,7 +43,7 @@ def figure_8():
         for a, b in enumerate(matching.indices):
             ends = before.corners[a], aside.corners[b]
             plot.path(ax, ends, None if a else label, plot.METHODS[method], **look)
-    for environment, names, up, words in (  # names stand beside their corners, a little up or down, clear of the lines
+    for environment, names, up, words in (  # names stand a little up or down, clear of the lines
         (before, "12345678", (-0.05, 0.04, 0.04, 0.05), "as demonstrated"),
         (aside, ascii_lowercase[:8], (-0.05, -0.04, -0.04, 0.03), "now"),
     ):
@@ -73,8 +74,9 @@ def outwards(environment):
 
 def label_corners(ax, environment, names, away):
     """A dot at each corner, and its name `away` (4N, 2) from it, in m."""
+    look = {"ha": "center", "va": "center", "fontsize": 11, "path_effects": [plot.HALO]}
     for place, name in zip(environment.corners + away, names, strict=True):
-        ax.text(*place, name, ha="center", va="center", fontsize=11, zorder=7, path_effects=[plot.HALO])
+        ax.text(*place, name, zorder=7, **look)
     ax.plot(*environment.corners.T, "o", color="black", markersize=4, zorder=6)
 
 
@@ -84,8 +86,8 @@ def figure_9():
 
     Line width grows with the logarithm of the spring constant; arrows are forces. The short springs
     within a box dwarf all others, and each force points into its own box as if there were no second
-    one: this is why the literal matching hangs on the boxes' sizes. The numbers are those of Figure 8;
-    the literal matching is what these springs lead to.
+    one: this is why the literal matching hangs on the boxes' sizes. The numbers are those of Figure
+    8; the literal matching is what these springs lead to.
     """
     environment = recordings.figure_eight_task().environment
     corners = environment.corners
@@ -99,7 +101,8 @@ def figure_9():
     arrows = {"angles": "xy", "scale_units": "xy", "scale": 110, "width": 0.015}
     right.quiver(*corners.T, *spring_forces(corners).T, color=plot.FORCE, zorder=5, **arrows)
     middle = environment.centres[environment.centres[:, 0].argmin()]
-    right.set(xlim=middle[0] + [-0.3, 0.3], ylim=middle[1] + [-0.3, 0.3], title="one box, with the forces", ylabel="")
+    right.set(xlim=middle[0] + [-0.3, 0.3], ylim=middle[1] + [-0.3, 0.3])
+    right.set(title="one box, with the forces", ylabel="")
     return figure, matching_numbers(environment, recordings.moved_environment(0))
 
 
@@ -120,13 +123,15 @@ def figure_10a():
     the moved cans with its own laser. The figure-eight still goes round both.
     """
     task, grid = recordings.figure_eight_task(), recordings.background_map()
-    figure, axes = plt.subplots(1, len(recordings.LAYOUTS), figsize=(WIDE, 3), sharey=True)
+    figure, axes = plt.subplots(1, len(LAYOUTS), figsize=(WIDE, 3), sharey=True)
+    dotted = {"linestyle": ":", "linewidth": 1.5}
+    grey = {"color": plot.BACKGROUND, "markeredgewidth": 1.5, "label": "subgoals before"}
     for k, ax in enumerate(axes):
-        adapted = recordings.adapted_task(k)
-        plot.workspace(grid, recordings.moved_scene(k).robot, adapted.environment.boxes, ax, f"layout {k + 1}")
-        plot.boxes(ax, task.environment.boxes, "obstacles before", plot.BACKGROUND, linestyle=":", linewidth=1.5)
+        adapted, robot = recordings.adapted_task(k), recordings.moved_scene(k).robot
+        plot.workspace(grid, robot, adapted.environment.boxes, ax, f"layout {k + 1}")
+        plot.boxes(ax, task.environment.boxes, "obstacles before", plot.BACKGROUND, **dotted)
         plot.law(ax, adapted.law.response())
-        ax.plot(*task.law.subgoals.T, "x", color=plot.BACKGROUND, markeredgewidth=1.5, label="subgoals before")
+        ax.plot(*task.law.subgoals.T, "x", **grey)
         plot.subgoals(ax, adapted.law.subgoals)
     show_part(axes, (0.2, 5.3))
     plot.legend_below(figure, axes[0])
@@ -135,16 +140,13 @@ def figure_10a():
 
 def adapting():
     """In how many layouts the matching is right, and the largest corner of the adapted laws."""
-    layouts = range(len(recordings.LAYOUTS))
-    corners = [recordings.largest_corner(recordings.adapted_task(k).law) for k in layouts]
-    right = sum(recordings.matched_right(k) for k in layouts)
-    return {"matching_right": right, "largest_corner_deg": np.degrees(max(corners))}
+    corner = max(recordings.largest_corner(recordings.adapted_task(k).law) for k in LAYOUTS)
+    right = sum(recordings.matched_right(k) for k in LAYOUTS)
+    return {"matching_right": right, "largest_corner_deg": np.degrees(corner)}
 
 
 def show_part(axes, heights):
-    """The middle of the laboratory, between two heights y in m: what lies beyond is blank in every
-    layout.
-    """
+    """The middle of the laboratory, between two heights y in m: beyond, every layout is blank."""
     for ax in axes:
         ax.set(xlim=(0.6, 8.6), ylim=heights)
         ax.label_outer()
@@ -159,8 +161,8 @@ def figure_10b():
     closely, and leaves it only where it is near a can. Clearance is from the robot's rim to the
     nearest obstacle.
     """
-    figure, rows = plt.subplots(2, len(recordings.LAYOUTS), figsize=(WIDE, 4.9), sharex=True, sharey=True)
-    runs_of = runs_by_kind(runs_in_every_layout)
+    figure, rows = plt.subplots(2, len(LAYOUTS), figsize=(WIDE, 4.9), sharex=True, sharey=True)
+    runs_of = by_kind(runs_in_every_layout)
     for axes, (kind, (title, _)) in zip(rows, CONTROLS.items(), strict=True):
         for k, ax in enumerate(axes):
             draw_runs(ax, recordings.adapted_task(k), runs_of[kind][k], f"layout {k + 1}")
@@ -172,7 +174,7 @@ def figure_10b():
 
 def runs_in_every_layout(control, avoid):
     """Runs of the adapted task, a list for each layout."""
-    return [recordings.moved_runs(k, control, avoid) for k in range(len(recordings.LAYOUTS))]
+    return [recordings.moved_runs(k, control, avoid) for k in LAYOUTS]
 
 
 @panel("x1", literal="literal", robust="robust")
@@ -197,7 +199,7 @@ def figure_x1():
 
 
 def draw_shares_by_noise(ax, shares):
-    """Share of random layouts all right against the noise of their boxes, by method and number of objects."""
+    """Share of random layouts all right by the noise of boxes, a line per method and number."""
     for (method, objects), rows in shares.groupby(["method", "objects"]):
         look = {"color": plot.METHODS[method], "marker": {2: "o", 3: "s", 4: "^"}[objects]}
         ax.plot(rows.noise, rows.right, label=f"{method}, {objects} objects", **look)

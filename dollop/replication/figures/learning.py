@@ -7,14 +7,14 @@ from scipy.stats import binomtest
 
 from dollop import plot
 from dollop.replication import baseline, recordings
+from dollop.replication.figures.controls import COLUMNS, CONTROLS, by_kind, draw_runs, numbers
 from dollop.replication.figures.panel import panel
 from dollop.replication.figures.performing import law_numbers
-from dollop.replication.figures.runs import COLUMNS, CONTROLS, draw_runs, numbers, runs_by_kind
 
 SIZE = (6, 5.2)
 SPREAD = 0.15  # m, standard deviation of a subgoal in figure x2
 NUMBERS, FEW = (1, 2, 3, 4, 5, 7, 10), (2, 5, 10)  # of demonstrations
-LINES = {  # method: name in the metrics, marker, seeds, numbers of demonstrations
+LINES = {  # method: name in metrics.json, marker, seeds, numbers of demonstrations
     "merging": ("merging", "o", 50, NUMBERS),
     "plain mean": ("mean", "v", 50, NUMBERS),
     "HMM, BIC": ("hmm", "s", 12, FEW),
@@ -22,7 +22,7 @@ LINES = {  # method: name in the metrics, marker, seeds, numbers of demonstratio
 }
 
 
-@panel("x2", merging="merging", mean="plain mean", hmm="HMM, BIC", left_to_right="left-to-right HMM, BIC")
+@panel("x2", **{name: method for method, (name, *_) in LINES.items()})
 def figure_x2():
     """Beyond the paper: learning a task from more and more demonstrations.
 
@@ -37,10 +37,13 @@ def figure_x2():
     for k, (method, rows) in enumerate(table.groupby("method", sort=False)):
         draw_shares(left, method, rows, shift=0.08 * (k - 1.5))
         draw_errors(right, method, rows)
-    right.plot(NUMBERS, expected_error(np.array(NUMBERS)), ":", color="black", label="expected of a mean of n")
-    left.set(xlabel="demonstrations", ylabel="share with right number and order", ylim=(-0.03, 1.03))
+    expected = expected_error(np.array(NUMBERS))
+    right.plot(NUMBERS, expected, ":", color="black", label="expected of a mean of n")
+    left.set(ylabel="share with right number and order", ylim=(-0.03, 1.03))
     left.legend(loc="lower right")
-    right.set(xlabel="demonstrations", ylabel="mean error of a subgoal [m]", xscale="log", yscale="log")
+    right.set(ylabel="mean error of a subgoal [m]", xscale="log", yscale="log")
+    for ax in (left, right):
+        ax.set_xlabel("demonstrations")
     right.set_xticks((1, 2, 5, 10), ("1", "2", "5", "10"))
     right.set_yticks((0.05, 0.1, 0.2, 0.5, 1), ("0.05", "0.1", "0.2", "0.5", "1"))
     right.minorticks_off()
@@ -63,12 +66,13 @@ def expected_error(n):
 
 
 def draw_shares(ax, method, rows, shift):
-    """How often a method finds the right subgoals in the right order, with 95 % intervals (Wilson)."""
+    """How often a method finds the right subgoals in the right order, with Wilson's intervals."""
     _, marker, seeds, _ = LINES[method]
     right = rows.groupby("n").right_order.agg(["sum", "count"])
     share = right["sum"] / right["count"]
-    ends = [binomtest(k, n).proportion_ci(method="wilson") for k, n in right.itertuples(index=False)]
-    reach = np.maximum([share - [end.low for end in ends], [end.high for end in ends] - share], 0)
+    counted = right.itertuples(index=False)
+    ends = np.transpose([binomtest(k, n).proportion_ci(method="wilson") for k, n in counted])
+    reach = np.maximum([share - ends[0], ends[1] - share], 0)
     look = {"color": plot.METHODS[method], "marker": marker, "label": f"{method} ({seeds} seeds)"}
     ax.errorbar(share.index + shift, share, reach, **look)
 
@@ -162,7 +166,7 @@ def figure_12b():
     it goes round what is in the way, and that alone is why nothing is touched. The circles are the
     robot where it first touches something.
     """
-    task, runs_of = recordings.new_slalom_task(), runs_by_kind(recordings.slalom_runs)
+    task, runs_of = recordings.new_slalom_task(), by_kind(recordings.slalom_runs)
     figure, axes = plt.subplots(2, 1, figsize=(8, 6.4), sharex=True)
     for ax, (kind, (title, _)) in zip(axes, CONTROLS.items(), strict=True):
         draw_runs(ax, task, runs_of[kind], title)
@@ -179,7 +183,8 @@ def figure_12b():
 def passed_rightly(runs):
     """How many runs pass every cone on the demonstrated side.
 
-    Not asked of the plain law's runs: a robot that backs off the cone it touched faces any way there.
+    Not asked of the plain law's runs: a robot that backs off the cone it touched faces any way
+    there.
     """
     shown = recordings.slalom_demonstration(0)
     sides = recordings.passing_sides(shown.law.response(), shown.environment.centres)

@@ -5,8 +5,9 @@ import numpy as np
 from matplotlib.patches import ConnectionPatch, Rectangle
 
 import dollop
-from dollop import plot
+from dollop import lab, plot
 from dollop.foreground import ForegroundGrid, endpoints, foreground_mask
+from dollop.lab.truth import track_error
 from dollop.observation import STATIC_EVERY, foreground_hits, static_boxes
 from dollop.replication import recordings
 from dollop.replication.figures.panel import panel
@@ -21,9 +22,7 @@ def figure_1():
     A Pioneer 2 DX with its real dimensions: two driven wheels, a castor, and the SICK on top. The
     paper has a photograph; this is the model that the simulation drives.
     """
-    from dollop.lab import render_robot
-
-    return plot.picture(render_robot()), {}
+    return plot.picture(lab.render_robot()), {}
 
 
 @panel("2")
@@ -39,8 +38,8 @@ def figure_2():
         draw_frame(ax, corner, size, words)
     for place, words, does, record in WAY.values():
         draw_stage(ax, place, words, f"{does.__qualname__}\n→ {record.__name__}")
-    for before, after in WAY_ON:
-        draw_step(ax, WAY[before][0], WAY[after][0])
+    for step in WAY_ON.split():
+        draw_step(ax, *(WAY[stage][0] for stage in step.split("-")))
     ax.set(xlim=(-1.4, 15.1), ylim=(-0.85, 4.35), aspect="equal")
     ax.set_axis_off()
     return figure, {}
@@ -60,37 +59,29 @@ WAY = {  # stage: its place in the drawing, the paper's word for it, what does i
     "adapt": ((13.65, 1.5), "updating subgoals", dollop.Task.adapt, dollop.Task),
     "perform": ((13.65, 0), "performing the task", dollop.perform, dollop.Run),
 }
-WAY_ON = (
-    ("log", "observe"),
-    ("background", "observe"),
-    ("observe", "subgoals"),
-    ("observe", "configure"),
-    ("subgoals", "associate"),
-    ("configure", "associate"),
-    ("associate", "map"),
-    ("map", "learn"),
-    ("learn", "adapt"),
-    ("new", "adapt"),
-    ("adapt", "perform"),
-)
+WAY_ON = """log-observe background-observe observe-subgoals observe-configure subgoals-associate
+configure-associate associate-map map-learn learn-adapt new-adapt adapt-perform"""
 FRAMES = (  # lower left corner, width and height, what holds for the stages in it
     ((1.4, -0.7), (8.0, 4.85), "once per demonstration"),
-    ((9.65, 2.3), (5.3, 1.85), f"all demonstrations: {dollop.learn.__name__} → {dollop.Task.__name__}"),
+    ((9.65, 2.3), (5.3, 1.85), "all demonstrations: learn → Task"),
 )
 
 
 def draw_frame(ax, corner, size, words):
     """A grey field behind stages that belong together, with words along its upper edge."""
     ax.add_patch(Rectangle(corner, *size, facecolor="#EBEBEB", zorder=0))
-    ax.text(corner[0] + 0.12, corner[1] + size[1] - 0.12, words, va="top", style="italic", color="0.3")
+    x, y = np.add(corner, (0.12, size[1] - 0.12))
+    ax.text(x, y, words, va="top", style="italic", color="0.3")
 
 
 def draw_stage(ax, place, words, code):
     """A box with a stage's name in words, and under it the names in the code."""
     lower_left = np.subtract(place, np.divide(STAGE, 2))
-    ax.add_patch(Rectangle(lower_left, *STAGE, facecolor="white", edgecolor=plot.USER, linewidth=1.5, zorder=2))
-    ax.text(*place + np.array([0, 0.23]), words, ha="center", va="center", weight="bold", zorder=3, linespacing=1.0)
-    ax.text(*place - np.array([0, 0.28]), code, ha="center", va="center", family="monospace", fontsize=8, zorder=3)
+    edge = {"facecolor": "white", "edgecolor": plot.USER, "linewidth": 1.5}
+    ax.add_patch(Rectangle(lower_left, *STAGE, zorder=2, **edge))
+    (x, y), middle = place, {"ha": "center", "va": "center", "zorder": 3}
+    ax.text(x, y + 0.23, words, weight="bold", linespacing=1.0, **middle)
+    ax.text(x, y - 0.28, code, family="monospace", fontsize=8, **middle)
 
 
 def draw_step(ax, before, after):
@@ -98,7 +89,8 @@ def draw_step(ax, before, after):
     sideways, upwards = np.sign(np.subtract(after, before))
     across = before[1] == after[1] or before[0] != after[0]
     half = np.divide(STAGE, 2) * ((sideways, 0) if across else (0, upwards))
-    ax.annotate("", after - half, before + half, arrowprops={"arrowstyle": "-|>", "linewidth": 1.5}, zorder=4)
+    look = {"arrowstyle": "-|>", "linewidth": 1.5}
+    ax.annotate("", after - half, before + half, arrowprops=look, zorder=4)
 
 
 @panel("3")
@@ -119,9 +111,7 @@ def figure_3():
 
 
 def scan_beside_the_cans(log):
-    """A scan in which both cans and the walker are in sight: the first after a quarter of the first
-    lap.
-    """
+    """A scan with both cans and the walker in sight: the first after a quarter of a lap."""
     return int(np.searchsorted(log.t, log.t[0] + 6.0))
 
 
@@ -154,12 +144,13 @@ def figure_4():
     stages["foreground cells"].plot(*points[cells].T, ".", color=plot.USER, markersize=4)
     foreground = draw_memory(stages["foreground grid"], log, grid, range(i + 1), GAIN)
     draw_objects(stages["foreground objects"], foreground)
-    draw_memory(stages["slower foreground grid"], log, grid, range(0, len(log.t), STATIC_EVERY), STATIC_GAIN)
+    some = range(0, len(log.t), STATIC_EVERY)
+    draw_memory(stages["slower foreground grid"], log, grid, some, STATIC_GAIN)
     draw_tracks(stages["tracks, and the user"], observation, log.t[i])
     plot.boxes(stages["static objects"], observation.environment.boxes)
     figure.canvas.draw()  # so that the axes are where the arrows ask for them
     for before, after in FLOW:
-        connect(figure, stages[before], stages[after])
+        connect(figure, axes.flat[before], axes.flat[after])
     return figure, {}
 
 
@@ -167,34 +158,23 @@ STAGES = (  # two rows
     *("laser scan", "foreground cells", "foreground grid", "foreground objects"),
     *("background map", "slower foreground grid", "static objects", "tracks, and the user"),
 )
-FLOW = (
-    ("laser scan", "foreground cells"),
-    ("background map", "foreground cells"),
-    ("foreground cells", "foreground grid"),
-    ("foreground grid", "foreground objects"),
-    ("foreground objects", "tracks, and the user"),
-    ("foreground cells", "slower foreground grid"),
-    ("slower foreground grid", "static objects"),
-)
+FLOW = (0, 1), (4, 1), (1, 2), (2, 3), (3, 7), (1, 5), (5, 6)  # from stage to stage, numbered so
 
 
 def connect(figure, before, after):
-    """An arrow from one stage to another, which stands to its right, below it, or to its upper
-    right.
-    """
+    """An arrow from one stage to another, to its right, below it, or to its upper right."""
     start, end = (ax.get_subplotspec() for ax in (before, after))
+    places = (0.93, 1.02), (0.02, -0.02)
     if start.colspan == end.colspan:
         places = (0.5, -0.02), (0.5, 1.17)
-    else:
-        places = ((1.02, 0.5), (-0.02, 0.5)) if start.rowspan == end.rowspan else ((0.93, 1.02), (0.02, -0.02))
+    elif start.rowspan == end.rowspan:
+        places = (1.02, 0.5), (-0.02, 0.5)
     look = {"arrowstyle": "-|>", "mutation_scale": 18, "linewidth": 1.8, "color": "black"}
     figure.add_artist(ConnectionPatch(*places, before.transAxes, after.transAxes, **look))
 
 
 def draw_memory(ax, log, grid, scans, gain):
-    """A foreground grid that has taken in some scans: the darker a cell, the surer it is. Returns
-    the grid.
-    """
+    """A foreground grid that has taken in some scans, which it returns: the darker the surer."""
     foreground, hits = ForegroundGrid(grid, gain), foreground_hits(log, grid)
     for k in scans:
         foreground.update(hits[k], log.poses[k], log.angles, log.ranges[k])
@@ -226,10 +206,7 @@ def figure_5():
 
     Two trash cans about four metres apart among desks and stools; the robot watches from the wall.
     """
-    from dollop.lab import render_lab
-
-    recording = recordings.figure_eights()
-    return plot.picture(render_lab(recording.scene)), {}
+    return plot.picture(lab.render_lab(recordings.figure_eights().scene)), {}
 
 
 SIZE = (6, 5.2)
@@ -243,8 +220,6 @@ def figure_6a():
     is no error of tracking: a laser sees only the near side of a body. The track error is what
     remains without it.
     """
-    from dollop.lab.truth import track_error
-
     recording, observation = recordings.figure_eights(), recordings.figure_eights_observed()
     user, sensor = observation.user, recording.log.poses[0]
     figure, ax = plt.subplots(figsize=SIZE)

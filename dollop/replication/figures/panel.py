@@ -23,30 +23,23 @@ class Panel:
     columns : dict
         Where the numbers are of several things: how their names begin in metrics.json, and what
         each thing is. A number without such a beginning is of all that have none of their own.
+    caption : str
+        What it shows, after the paper's caption: the first paragraph of the drawing's docstring.
+    look : str
+        What to look at, and what to make of it: the rest of the docstring.
     """
 
     id: str
     draw: Callable
     columns: dict
-
-    @property
-    def caption(self):
-        """What it shows, after the paper's caption: the first paragraph of the drawing's docstring."""
-        return self._paragraphs()[0]
-
-    @property
-    def look(self):
-        """What to look at, and what to make of it: the rest of the docstring, in one line."""
-        return " ".join(self._paragraphs()[1:])
+    caption: str
+    look: str
 
     @property
     def picture(self):
         """File name of the PNG: "6a" -> "fig_06a.png", which sorts as the paper has it."""
         number = self.id.rstrip("ab")
         return f"fig_{number.zfill(2)}{self.id[len(number) :]}.png"
-
-    def _paragraphs(self):
-        return [" ".join(part.split()) for part in inspect.getdoc(self.draw).split("\n\n")]
 
 
 def panel(id, **columns):
@@ -66,7 +59,8 @@ def panel(id, **columns):
     """
 
     def register(draw):
-        PANELS[id] = Panel(id, draw, columns)
+        caption, look = inspect.getdoc(draw).split("\n\n", 1)
+        PANELS[id] = Panel(id, draw, columns, " ".join(caption.split()), " ".join(look.split()))
         return draw
 
     return register

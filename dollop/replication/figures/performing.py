@@ -6,8 +6,8 @@ import numpy as np
 from dollop import plot
 from dollop.pose import wrapped
 from dollop.replication import recordings
+from dollop.replication.figures.controls import COLUMNS, CONTROLS, by_kind, draw_runs, numbers
 from dollop.replication.figures.panel import panel
-from dollop.replication.figures.runs import COLUMNS, CONTROLS, draw_runs, numbers, runs_by_kind
 from dollop.replication.runs import distances_to_law, return_times
 from dollop.trajectory import mean_trajectory
 
@@ -75,7 +75,7 @@ def figure_7a():
 
 def draw_both(work):
     """A figure of the figure-eight's runs under both kinds of control, and these runs by kind."""
-    task, runs_of = recordings.figure_eight_task(), runs_by_kind(work)
+    task, runs_of = recordings.figure_eight_task(), by_kind(work)
     figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
     for ax, (kind, (title, _)) in zip(axes, CONTROLS.items(), strict=True):
         draw_runs(ax, task, runs_of[kind], title)

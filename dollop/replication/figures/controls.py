@@ -5,13 +5,13 @@ import joblib
 from dollop import plot
 from dollop.replication import recordings
 
-__all__ = ["COLUMNS", "CONTROLS", "at_once", "draw_runs", "numbers", "runs_by_kind"]
+__all__ = ["COLUMNS", "CONTROLS", "at_once", "draw_runs", "numbers", "by_kind"]
 
 CONTROLS = {
     "plain": ("the paper's kind of control: plain, obstacles ignored", ("plain", False)),
     "own": ("Dollop's own: pursuit, going round obstacles", ("pursuit", True)),
 }
-"""What each kind is, and how it is asked of the recordings: control, and whether to avoid obstacles."""
+"""What each kind is, and how the recordings are asked for it: control and avoid."""
 
 COLUMNS = {"plain": "plain, obstacles ignored", "own": "pursuit, going round obstacles"}
 """The same in few words, over the columns of numbers."""
@@ -35,7 +35,7 @@ def at_once(work, arguments):
     return joblib.Parallel(n_jobs=2)(joblib.delayed(work)(*each) for each in arguments)
 
 
-def runs_by_kind(work):
+def by_kind(work):
     """The runs of both kinds of control.
 
     Parameters
@@ -48,7 +48,8 @@ def runs_by_kind(work):
     dict
         By kind, a key of `CONTROLS`.
     """
-    return dict(zip(CONTROLS, at_once(work, [choices for _, choices in CONTROLS.values()]), strict=True))
+    choices = [choices for _, choices in CONTROLS.values()]
+    return dict(zip(CONTROLS, at_once(work, choices), strict=True))
 
 
 def draw_runs(ax, task, runs, title):
@@ -90,7 +91,7 @@ def numbers(runs_of, further=None):
 
 
 def outcome(runs):
-    """How many runs finished, how often and in how many the robot hit something, how near it came."""
+    """How many runs finished, how often and in how many something was hit, how near they came."""
     return {
         "finished": sum(run.finished for run in runs),
         "collisions": sum(run.collisions for run in runs),
