@@ -69,7 +69,7 @@ def plain_text_first(app, what, name, thing, options, lines):
     """Docstrings are written to be read as they are: |x| is a length there, `.law` an attribute."""
     for n, line in enumerate(lines):
         prose = line if line[:1] in ("", " ", ">", "=") else line.replace("|", r"\|")
-        lines[n] = re.sub(r"(?<!`)`(\.[^`]+)`(?!`)", r"``\1``", prose)
+        lines[n] = re.sub(r"(?<!`)`(\.\w[\w.()]*)`(?!`)", r"``\1``", prose)
     if what in ("property", "attribute", "data"):
         lines.insert(0, "")  # or napoleon takes what stands before a colon for a type
 
@@ -82,8 +82,10 @@ def formulas_as_they_stand(app, what, name, thing, options, lines):
             lines[n:n] = ["", "::"]
 
 
-def defined_elsewhere(app, what, name, thing, skip, options):
-    """Leave out what a package only hands on: it has its entry on the page of its own module."""
+def told_elsewhere(app, what, name, thing, skip, options):
+    """Leave out what a package only hands on, and a NamedTuple's fields: both have their entry."""
+    if type(thing).__name__ == "_tuplegetter":
+        return True
     if what != "module" or not hasattr(thing, "__qualname__"):
         return None
     return True if thing.__module__ != app.env.current_document.autodoc_module else None
@@ -108,5 +110,5 @@ def setup(app):
     app.add_html_math_renderer("mathml", (inline_formula, None), (block_formula, None))
     for prepare in (plain_text_first, formulas_as_they_stand):
         app.connect("autodoc-process-docstring", prepare, priority=400)  # before napoleon
-    app.connect("autodoc-skip-member", defined_elsewhere)
+    app.connect("autodoc-skip-member", told_elsewhere)
     app.connect("missing-reference", by_short_name)
