@@ -5,6 +5,7 @@ reconstruction.
 """
 
 import numpy as np
+import scipy
 
 from dollop.trajectory import arc_length, check_trajectory, resample
 
@@ -38,13 +39,12 @@ def lap_lag(track):
         At most two thirds of n: less than half a lap walked twice is no repetition.
     """
     lags = np.arange(1, 2 * len(track) // 3)
-    apart = np.array([np.median(np.linalg.norm(track[lag:] - track[:-lag], axis=1)) for lag in lags])
+    gaps = (np.linalg.norm(track[lag:] - track[:-lag], axis=1) for lag in lags)
+    apart = np.array([np.median(gap) for gap in gaps])
     typical = np.sqrt(2 * track.var(axis=0).sum())  # rms distance of two places picked at random
     met = np.maximum.accumulate(apart > typical / 2) & (apart < REPEATS * typical)
-    if not met.any():
-        return 0
-    first = np.argmax(met)
-    return int(lags[first + np.argmin(apart[first : first + np.argmin(np.append(met[first:], False))])])
+    dips, count = scipy.ndimage.label(met)
+    return int(lags[np.where(dips == 1, apart, np.inf).argmin()]) if count else 0
 
 
 def distance_to_next_lap(track, lag):
@@ -99,7 +99,8 @@ def laps(t, positions):
     """
     t, points = np.asarray(t, float), check_trajectory(positions, "positions")
     if t.shape != (len(points),) or not (np.diff(t) > 0).all():
-        raise ValueError(f"t must increase and hold one time per position, got shape {t.shape} for {len(points)}")
+        rule = "t must increase and hold one time per position"
+        raise ValueError(f"{rule}, got shape {t.shape} for {len(points)}")
     period = np.median(np.diff(t))
     even = t[0] + period * np.arange(int((t[-1] - t[0]) / period + 1.5))
     points = np.stack([np.interp(even, t, column) for column in points.T], axis=1)
@@ -156,8 +157,9 @@ def gate_crossings(points, walked, gate, lap, width):
     list of int
         Starting with `gate`; alone if the track is not straight enough there to have a direction.
     """
-    first, last = np.searchsorted(walked, [walked[gate] - GATE_SLACK * lap, walked[gate] + GATE_SLACK * lap])
-    last = min(last, len(points) - 1)
+    slack = GATE_SLACK * lap
+    # The last sample stands for all that is beyond: hence all but it.
+    first, last = np.searchsorted(walked[:-1], walked[gate] + [-slack, slack])
     heading = points[last] - points[first]
     if np.linalg.norm(heading) <= STRAIGHT * (walked[last] - walked[first]):
         return [gate]

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dollop.checks import checked_array
 from dollop.pose import rotation
 from dollop.trajectory import check_trajectories, retime
 
@@ -48,9 +49,6 @@ class Statistics:
 
     G0: np.ndarray
     G1: np.ndarray
-
-    def __repr__(self):
-        return f"Statistics(G0={np.shape(self.G0)}, G1={np.shape(self.G1)})"
 
     def __add__(self, other):
         return Statistics(self.G0 + other.G0, self.G1 + other.G1)
@@ -122,12 +120,9 @@ class LDS:
     goal: np.ndarray
 
     def __post_init__(self):
-        object.__setattr__(self, "goal", np.array(self.goal, float))
-        G0, G1 = np.asarray(self.statistics.G0, float), np.asarray(self.statistics.G1, float)
-        if G0.shape != (2, 2) or G1.shape != (2, 2) or self.goal.shape != (2,):
-            raise ValueError(f"G0 and G1 must be (2, 2) and goal (2,), got {G0.shape}, {G1.shape}, {self.goal.shape}")
-        if not (np.isfinite(G0).all() and np.isfinite(G1).all() and np.isfinite(self.goal).all()):
-            raise ValueError(f"G0, G1 and goal must be finite, got {G0.tolist()}, {G1.tolist()}, {self.goal}")
+        object.__setattr__(self, "goal", checked_array("goal", self.goal, 2))
+        checked_array("G0", self.statistics.G0, 2, 2)
+        checked_array("G1", self.statistics.G1, 2, 2)
         radius = np.abs(np.linalg.eigvals(self.A)).max()
         if not radius < 1:
             raise ValueError(f"A must have a spectral radius below one, got {radius}")

@@ -68,9 +68,8 @@ def raw_statistics(walks, moments):
     sums = [running_sums(walk - walk.mean(axis=0)) for walk in walks]
 
     def statistics(start, length):
-        start = np.asarray(start)
-        parts = [shifted_sums(s, cut[start], cut[start + length]) for s, cut in zip(sums, cuts, strict=True)]
-        return sum(parts[1:], parts[0])
+        first, *others = map(shifted_sums, sums, cuts[:, start], cuts[:, start + length])
+        return sum(others, first)
 
     return statistics
 
@@ -78,8 +77,8 @@ def raw_statistics(walks, moments):
 def running_sums(walk):
     """The walk (N, d), and sums of p[n], p[n] p[n]^T, p[n+1] p[n]^T over the n before each."""
     now, after = walk[:-1], walk[1:]
-    terms = now, now[:, :, None] * now[:, None], after[:, :, None] * now[:, None]
-    return walk, *(np.concatenate([np.zeros((1, *term.shape[1:])), term.cumsum(axis=0)]) for term in terms)
+    terms = now, outer(now, now), outer(after, now)
+    return walk, *(np.insert(term.cumsum(axis=0), 0, 0, axis=0) for term in terms)
 
 
 def shifted_sums(sums, start, end):
@@ -87,13 +86,13 @@ def shifted_sums(sums, start, end):
     walk, first, now, after = sums
     goal, count = walk[end], (end - start)[..., None, None]
     total = first[end] - first[start]
-    later = total + walk[end] - walk[start]
+    later = total + goal - walk[start]
     square = count * outer(goal, goal)
     G0 = now[end] - now[start] - outer(total, goal) - outer(goal, total) + square
     G1 = after[end] - after[start] - outer(later, goal) - outer(goal, total) + square
     # Less than this is what rounding leaves of nothing.
-    moves = np.trace(G0, axis1=-2, axis2=-1) > 1e-10 * np.trace(now[-1])
-    return Statistics(np.where(moves[..., None, None], G0, 0), np.where(moves[..., None, None], G1, 0))
+    moves = np.trace(G0, axis1=-2, axis2=-1)[..., None, None] > 1e-10 * np.trace(now[-1])
+    return Statistics(np.where(moves, G0, 0), np.where(moves, G1, 0))
 
 
 def outer(a, b):
@@ -156,8 +155,9 @@ def distances(points, polylines):
     lifted[..., :d] = points
     closest = (lifted @ np.ascontiguousarray(np.swapaxes(weights, 1, 2))).argmin(axis=2)
     flat, row = polylines.reshape(-1, d), count * np.arange(len(points))[:, None]
-    edges = np.maximum(closest - 1, 0), np.minimum(closest, count - 2)
-    return np.minimum(*(distance_to_edge(points, *flat.take([row + e, row + e + 1], axis=0)) for e in edges))
+    tails = row + np.maximum(closest - 1, 0), row + np.minimum(closest, count - 2)
+    edges = (flat.take([tail, tail + 1], axis=0) for tail in tails)
+    return np.minimum(*(distance_to_edge(points, *ends) for ends in edges))
 
 
 def distance_to_edge(points, tail, head):
@@ -205,10 +205,9 @@ def fewest_segments(errors, tolerance):
     kept = np.where(mean <= tolerance, errors, np.inf)
     cuts = divide(kept, lambda total, k: np.isfinite(total))
     if cuts is None:
-        raise ValueError(
-            f"tolerance {tolerance} m cannot be kept with {count} candidate cuts, {least_tolerance(mean):.3g} m can; "
-            "a larger tolerance or more candidates would do"
-        )
+        least = f"with {count} candidate cuts, {least_tolerance(mean):.3g} m can"
+        remedy = "a larger tolerance or more candidates would do"
+        raise ValueError(f"tolerance {tolerance} m cannot be kept {least}; {remedy}")
     return cuts
 
 
@@ -239,22 +238,14 @@ def divide(errors, enough):
     cut = np.arange(len(errors))
     errors = errors + EVEN * ((cut - cut[:, None]) ** 2 + 0.01 * cut)
     total = np.where(cut == 0, 0.0, np.inf)
-    before = []
+    best = np.zeros((len(errors), 1), int)  # the cuts of the best division up to each cut
     for k in range(1, len(errors)):
         sums = total[:, None] + errors
-        before.append(sums.argmin(axis=0))
+        best = np.column_stack([best[sums.argmin(axis=0)], cut])
         total = sums.min(axis=0)
         if enough(total[-1], k):
-            return trace_back(before)
+            return best[-1]
     return None
-
-
-def trace_back(before):
-    """The cuts (K + 1,) from the last one back, before[k][j] being the cut before cut j."""
-    cuts = [len(before[0]) - 1]
-    for choice in reversed(before):
-        cuts.append(choice[cuts[-1]])
-    return np.array(cuts[::-1])
 
 
 def least_tolerance(mean):

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dollop.checks import check_positive, checked_array
 from dollop.lds import LDS
 from dollop.segmentation import best_segments, fewest_segments, raw_statistics, retimed_statistics, segment_errors
 from dollop.trajectory import align, arc_length, check_trajectories, check_trajectory, distance_to_polyline, resample
@@ -33,9 +34,9 @@ class SequencedLDS:
     speeds: np.ndarray
 
     def __repr__(self):
-        (x, y), (goal_x, goal_y) = self.start, self.subgoals[-1]
-        way = f"from ({x:.2f}, {y:.2f}) to ({goal_x:.2f}, {goal_y:.2f})"
-        return f"SequencedLDS of {len(self.segments)} segments {way}"
+        ends = self.start, self.subgoals[-1]
+        way = " to ".join(f"({x:.2f}, {y:.2f})" for x, y in ends)
+        return f"SequencedLDS of {len(self.segments)} segments from {way}"
 
     @property
     def subgoals(self):
@@ -93,7 +94,8 @@ class SequencedLDS:
         path, moments = aligned.mean(axis=0)[::2], cut_moments(walks, shares[:, ::2])
         statistics = retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
         errors = segment_errors(path, statistics)
-        cuts = fewest_segments(errors, tolerance) if n_segments is None else best_segments(errors, n_segments)
+        exactly = n_segments is not None
+        cuts = best_segments(errors, n_segments) if exactly else fewest_segments(errors, tolerance)
         spans = zip(cuts[:-1], np.diff(cuts), path[cuts[1:]], strict=True)
         segments = tuple(LDS(statistics(start, length), goal) for start, length, goal in spans)
         return cls(segments, path[0], demonstrated_speeds(walks, moments[:, cuts], sample_period))
@@ -130,12 +132,9 @@ class SequencedLDS:
         >>> bool(np.linalg.norm(law.response([-30.0, 20.0])[-1] - law.subgoals[-1]) <= 0.01)
         True
         """
-        state = np.asarray(self.start if start is None else start, float)
-        if state.shape != (2,) or not np.isfinite(state).all():
-            raise ValueError(f"start must be two finite numbers, got {start}")
         if not reach >= LEAST_REACH:
             raise ValueError(f"reach must be at least {LEAST_REACH:g} m, got {reach}")
-        states = [state]
+        states = [checked_array("start", self.start if start is None else start, 2)]
         for segment in self.segments:
             while np.linalg.norm(states[-1] - segment.goal) > reach:
                 states.append(segment.step(states[-1]))
@@ -218,17 +217,14 @@ class SequencedLDS:
         >>> np.allclose(moved.response(), law.response() + [3.0, 0.0])
         True
         """
-        goals = np.asarray(subgoals, float)
-        if goals.shape != self.subgoals.shape or not np.isfinite(goals).all():
-            raise ValueError(f"subgoals must be {len(self.segments)} finite positions, got {subgoals}")
-        start = self.start if start is None else np.asarray(start, float)
-        if start.shape != (2,) or not np.isfinite(start).all():
-            raise ValueError(f"start must be two finite numbers, got {start}")
-        segments = [replace(segment, goal=goal) for segment, goal in zip(self.segments, goals, strict=True)]
+        goals = checked_array("subgoals", subgoals, len(self.segments), 2)
+        start = checked_array("start", self.start if start is None else start, 2)
+        segments = self.segments
         if turned:
             turns = chord_angles(start, goals) - chord_angles(self.start, self.subgoals)
-            segments = [segment.turned(turn) for segment, turn in zip(segments, turns, strict=True)]
-        return replace(self, segments=tuple(segments), start=start)
+            segments = map(LDS.turned, segments, turns)
+        moved = [replace(segment, goal=goal) for segment, goal in zip(segments, goals, strict=True)]
+        return replace(self, segments=tuple(moved), start=start)
 
 
 def chord_angles(start, subgoals):
@@ -239,25 +235,25 @@ def chord_angles(start, subgoals):
 
 def check_search(tolerance, n_segments, sample_period, candidates):
     """Raise ValueError for a parameter of `SequencedLDS.fit` that is out of its range."""
-    if not tolerance > 0:
-        raise ValueError(f"tolerance must be positive, got {tolerance}")
-    if not 0 < sample_period < np.inf:
-        raise ValueError(f"sample_period must be positive, got {sample_period}")
+    check_positive("tolerance", tolerance)
+    check_positive("sample_period", sample_period)
     if not 3 <= candidates <= MOST_CANDIDATES:
         raise ValueError(f"candidates must be 3 to {MOST_CANDIDATES}, got {candidates}")
     most = (candidates - 1) // 2
     if n_segments is not None and n_segments not in range(1, most + 1):
-        raise ValueError(f"n_segments must be a whole number from 1 to {most} (half the candidates), got {n_segments}")
+        rule = f"n_segments must be a whole number from 1 to {most} (half the candidates)"
+        raise ValueError(f"{rule}, got {n_segments}")
 
 
 def cut_moments(walks, shares):
     """When each walk is at given shares (K, C) of its way: (K, C) fractional sample numbers."""
-    walked = [arc_length(walk) for walk in walks]
-    return np.array([np.interp(s * w[-1], w, np.arange(len(w))) for s, w in zip(shares, walked, strict=True)])
+    pairs = zip(shares, map(arc_length, walks), strict=True)
+    return np.array([np.interp(share * w[-1], w, np.arange(len(w))) for share, w in pairs])
 
 
 def demonstrated_speeds(walks, moments, sample_period):
     """Mean speed (S,) in m/s between fractional sample numbers (K, S + 1), over all walks."""
-    walked = [np.interp(m, np.arange(len(w)), arc_length(w)) for m, w in zip(moments, walks, strict=True)]
+    pairs = zip(moments, map(arc_length, walks), strict=True)
+    walked = [np.interp(moment, np.arange(len(w)), w) for moment, w in pairs]
     taken = np.maximum(np.diff(moments, axis=1).sum(axis=0), np.finfo(float).tiny)
     return np.diff(walked, axis=1).sum(axis=0) / (taken * sample_period)

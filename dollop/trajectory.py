@@ -120,9 +120,9 @@ def at_arc_length(points, distance):
            [3. , 5. ]])
     """
     walked = arc_length(points)
-    moved = np.concatenate([[True], np.diff(walked) > 0])
-    columns = (np.interp(distance, walked[moved], column[moved]) for column in np.asarray(points, float).T)
-    return np.stack(list(columns), axis=1)
+    moved = np.diff(walked, prepend=-1) > 0
+    columns = np.asarray(points, float)[moved].T
+    return np.stack([np.interp(distance, walked[moved], each) for each in columns], axis=1)
 
 
 def resample(points, n):
@@ -273,10 +273,13 @@ def align(trajectories, n=200):
     walks = check_trajectories(trajectories)
     share = np.tile(np.linspace(0, 1, n), (len(walks), 1))
     aligned = np.stack([resample(walk, n) for walk in walks])
-    fine = np.stack([resample(walk, 2 * n - 1) for walk in walks]) if len(walks) > 1 else None
-    for _ in range(_ROUNDS if len(walks) > 1 else 0):
+    if len(walks) == 1:
+        return aligned, share
+    fine = np.stack([resample(walk, 2 * n - 1) for walk in walks])
+    lengths = np.array([arc_length(walk)[-1] for walk in walks])
+    for _ in range(_ROUNDS):
         share = _monotone_warp(resample(aligned.mean(axis=0), n), fine)
-        aligned = np.stack([at_arc_length(w, s * arc_length(w)[-1]) for w, s in zip(walks, share, strict=True)])
+        aligned = np.stack(list(map(at_arc_length, walks, share * lengths[:, None])))
     return aligned, share
 
 
@@ -305,7 +308,7 @@ def _monotone_warp(reference, walks):
     best[:, 4] = 0.0
     moves = np.empty((n, len(walks), fine), int)
     for i in range(1, n):
-        reach = np.stack([best[:, 4 - move : 4 - move + fine] + penalty[:, move, None] for move in range(5)])
+        reach = np.stack([best[:, 4 - m :][:, :fine] + penalty[:, m, None] for m in range(5)])
         moves[i] = reach.argmin(axis=0)
         best[:, 4:] = reach.min(axis=0) + ((walks - reference[i]) ** 2).sum(axis=2)
     at = np.full((len(walks), n), fine - 1)

@@ -104,10 +104,10 @@ def test_no_unstable_system():
     """Statistics that no trajectory has are refused, and so are those that are not finite or of another dimension."""
     with pytest.raises(ValueError, match=r"spectral radius below one, got 1\.0"):
         LDS(Statistics(np.eye(2), np.eye(2)), np.zeros(2))
-    with pytest.raises(ValueError, match="must be finite"):
+    with pytest.raises(ValueError, match="G0 must be finite"):
         LDS(Statistics(np.diag([1.0, np.nan]), np.eye(2)), np.zeros(2))
-    with pytest.raises(ValueError, match=r"must be \(2, 2\) and goal \(2,\), got \(3, 3\)"):
-        LDS(Statistics(np.eye(3), np.zeros((3, 3))), np.zeros(3))
+    with pytest.raises(ValueError, match=r"G0 must have shape \(2, 2\), got \(3, 3\)"):
+        LDS(Statistics(np.eye(3), np.zeros((3, 3))), np.zeros(2))
 
 
 @pytest.mark.parametrize("state", [[1.0], 5, [np.nan, 0], [1.0, 2.0, 3.0]])
