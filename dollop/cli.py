@@ -18,7 +18,8 @@ STOPPED = 130
 
 
 def main(arguments=None):
-    """Run one command; a bad file or value, or Ctrl-C, ends it with one line instead of a traceback.
+    """Run one command; a bad file or value, or Ctrl-C, ends it with one line instead of a
+    traceback.
 
     Parameters
     ----------
@@ -28,7 +29,8 @@ def main(arguments=None):
     Raises
     ------
     SystemExit
-        With 1 and the message for what is refused, 2 for a usage that is none, 130 when interrupted.
+        With 1 and the message for what is refused, 2 for a usage that is none, 130 when
+        interrupted.
     """
     root, commands = _parser()
     arguments = sys.argv[1:] if arguments is None else arguments
@@ -47,53 +49,59 @@ def main(arguments=None):
 
 def _parser():
     """The parser of all commands, and their names."""
-    description = "Learning by observation with a mobile robot."
-    root = argparse.ArgumentParser(prog="dollop", description=description)
+    about = "Learning by observation with a mobile robot."
+    root = argparse.ArgumentParser(prog="dollop", description=about)
     root.add_argument("--version", action="version", version=f"dollop {dollop.__version__}")
     commands = root.add_subparsers(required=True, metavar="command")
     log = argparse.ArgumentParser(add_help=False)
     log.add_argument("log", help="CARMEN log (.log, .log.gz, .clf) or ROS bag")
-    log.add_argument("--topic", help="which LaserScan topic of a bag; needed only if there are several")
+    log.add_argument("--topic", help="LaserScan topic of a bag, if there are several")
 
-    map_help = "build a background map from a laser log with known poses"
-    build = commands.add_parser("map", parents=[log], help=map_help)
-    build.add_argument("map", help="what to write: .yaml (ROS map_server) or .map (CARMEN)")
-    build.add_argument("--resolution", type=float, default=0.05, help="m per cell (default: 0.05)")
-    build.set_defaults(run=_map)
+    def command(run, name, help, *parents):
+        parser = commands.add_parser(name, parents=parents, help=help)
+        parser.set_defaults(run=run)
+        return parser.add_argument
 
-    watch = commands.add_parser("observe", parents=[log], help="track the user in a laser log")
-    watch.add_argument("map", help="background map: .yaml (ROS map_server) or .map (CARMEN)")
-    area = "smallest foreground object in m^2 (default: 0.01)"
-    watch.add_argument("--min-area", type=float, default=0.01, help=area)
-    stride = "blobs nearer than this in m are one (default: 0)"
-    watch.add_argument("--stride", type=float, default=0.0, help=stride)
-    out = "the trajectory, a .csv; a .png of the same name lands beside it"
-    watch.add_argument("--out", default="user.csv", help=out)
-    watch.set_defaults(run=_observe)
-
-    data = commands.add_parser("data", help="remake the recordings that the notebooks read")
-    folder = "where to write (default: data)"
-    data.add_argument("--folder", type=Path, default=Path("data"), help=folder)
-    data.set_defaults(run=_data)
-
-    study = commands.add_parser("study", help="test the paper's claims over many seeds")
-    study.add_argument("ids", nargs="*", metavar="claim", help="all when none is given")
-    study.add_argument("--seeds", type=int, help="how many seeds (default: 100)")
-    study.add_argument("--quick", action="store_true", help="3 seeds, for a look")
-    cluster = "Dask scheduler to work on, such as tcp://host:8786"
-    study.add_argument("--scheduler", metavar="ADDRESS", help=cluster)
-    table = "where the table goes (default: study; study-quick when quick)"
-    study.add_argument("--folder", type=Path, help=table)
-    study.set_defaults(run=_study)
+    add = command(_map, "map", "build a background map from a log with known poses", log)
+    add("map", help="what to write: .yaml (ROS map_server) or .map (CARMEN)")
+    add("--resolution", type=float, default=0.05, help="m per cell (default: 0.05)")
+    add = command(_observe, "observe", "track the user in a laser log", log)
+    add("map", help="background map: .yaml (ROS map_server) or .map (CARMEN)")
+    add("--min-area", type=float, default=0.01, help="smallest foreground object in m^2 (default: 0.01)")
+    add("--stride", type=float, default=0.0, help="blobs nearer than this in m are one (default: 0)")
+    add("--out", default="user.csv", help="the trajectory (default: user.csv); a .png lands beside it")
+    add = command(_data, "data", "remake the recordings that the notebooks read")
+    add("--folder", type=Path, default=Path("data"), help="where to write (default: data)")
+    add = command(_study, "study", "test the paper's claims over many seeds")
+    add("ids", nargs="*", metavar="claim", help="which (default: all); an unknown one lists them")
+    add("--seeds", type=int, help="how many (default: 100)")
+    add("--quick", action="store_true", help="3 seeds, for a look")
+    add("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
+    add("--folder", type=Path, help="for the table (default: study; study-quick with --quick)")
     return root, tuple(commands.choices)
 
 
 def replication(module):
-    """A module of the replication, which a library that was installed without it does not have."""
+    """A module of the replication, which a library that was installed without it does not have.
+
+    Parameters
+    ----------
+    module : str
+        Its name in `dollop.replication`.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    ImportError
+        If the replication is not part of this installation.
+    """
     try:
         return import_module(f"dollop.replication.{module}")
     except ModuleNotFoundError as error:
-        if error.name != "dollop.replication":
+        if not error.name.startswith("dollop.replication"):
             raise
         raise ImportError("the replication is not part of this installation") from None
 
@@ -127,7 +135,7 @@ def _observe(options):
 
 
 def _outputs(options):
-    """Paths of the trajectory and of its picture, once it is clear that both can be written and cover no input."""
+    """Paths of the trajectory and its picture, if both can be written and cover no input."""
     from dollop.formats.files import check_writable
 
     out = Path(options.out)
@@ -147,8 +155,9 @@ def _write_track(user, path):
 
     from dollop.formats.files import whole_file
 
-    columns = {"t": user.t, "x": user.positions[:, 0], "y": user.positions[:, 1]}
-    table = pd.DataFrame(columns | {"occluded": user.occluded})
+    table = pd.DataFrame(user.positions, columns=["x", "y"])
+    table.insert(0, "t", user.t)
+    table["occluded"] = user.occluded
     with whole_file(path, "w") as stream:
         table.to_csv(stream, index=False, float_format="%.4f")
 

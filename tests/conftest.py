@@ -16,6 +16,13 @@ def pytest_make_parametrize_id(val, argname):
     return argname if isinstance(val, bytes) else None
 
 
+def pytest_collection_modifyitems(items):
+    """Mark what proves the paper, so that who works on the method can leave it out: pytest -m "not replication"."""
+    for item in items:
+        if "replication" in item.path.parts:
+            item.add_marker(pytest.mark.replication)
+
+
 @pytest.fixture(scope="session")
 def one_lap():
     """A walked figure-eight of one lap (N, 2)."""

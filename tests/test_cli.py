@@ -2,12 +2,15 @@
 
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from places import DATA
 
+import dollop
 from dollop.cli import LEG_HEIGHT, main
 
 
@@ -60,3 +63,58 @@ def test_walkers_seen_at_leg_height(tmp_path):
         main(["observe", bag, room, "--out", str(out)])
     main(["observe", bag, room, "--out", str(out), *re.search("--min-area.*", LEG_HEIGHT)[0].split()])
     assert pd.read_csv(out).t.iloc[-1] > 100
+
+
+def test_the_version_is_told(capsys):
+    """--version names the program and the version that the package has."""
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out == f"dollop {dollop.__version__}\n"
+
+
+def test_python_m_dollop_is_the_command_line():
+    """python -m dollop says the same as dollop."""
+    told = subprocess.run([sys.executable, "-m", "dollop", "--version"], capture_output=True, text=True, check=True)
+    assert told.stdout == f"dollop {dollop.__version__}\n"
+
+
+def test_an_unknown_command_lists_the_known_ones_in_one_line(capsys):
+    """Exit status 2, one line, every command."""
+    with pytest.raises(SystemExit) as end:
+        main(["obsevre", "a.log"])
+    assert end.value.code == 2
+    told = capsys.readouterr().err
+    assert told == "dollop: no command 'obsevre'; known: map, observe, data, study\n"
+
+
+def test_an_interrupt_ends_with_one_line(monkeypatch, capsys):
+    """Ctrl-C while a command works: exit status 130, and no traceback."""
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(dollop, "read_log", interrupted)
+    with pytest.raises(SystemExit) as end:
+        main(["observe", "a.log", "b.map", "--out", "c.csv"])
+    assert end.value.code == 130
+    assert capsys.readouterr().err.strip() == "dollop: stopped"
+
+
+@pytest.mark.parametrize("command", [["study"], ["study", "velocity", "--quick"], ["data"]])
+def test_a_missing_extra_is_named_before_the_work(command, monkeypatch, tmp_path):
+    """Without PyBullet the replication says at once how to install it, and writes nothing."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("dollop.extras.find_spec", lambda name: None)
+    with pytest.raises(SystemExit, match=r'^dollop: .*pip install "dollop\[lab\]"'):
+        main(command)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_library_without_the_replication_says_so(monkeypatch):
+    """What was installed without dollop.replication has no study: one line says that."""
+    for name in [name for name in sys.modules if name.startswith("dollop.replication")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "dollop.replication", None)
+    with pytest.raises(SystemExit, match="^dollop: the replication is not part of this installation$"):
+        main(["study"])
