@@ -8,7 +8,8 @@ the numbers of one seed that any machine must find again.
 
 import json
 import sys
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
+from functools import partial
 from math import isfinite, nan
 from pathlib import Path
 
@@ -142,19 +143,15 @@ def give_up_or_tell(error, deaths, todo):
 @contextmanager
 def workers(scheduler=None, jobs=-1):
     """What runs calls and yields results as they come: processes here, or on a Dask cluster."""
-    with dask_backend(scheduler) if scheduler else nullcontext():
-        patience = PATIENCE if scheduler else None
-        yield joblib.Parallel(jobs, return_as="generator_unordered", batch_size=1, timeout=patience)
-
-
-@contextmanager
-def dask_backend(scheduler):
-    """joblib on the Dask cluster at an address."""
+    parallel = partial(joblib.Parallel, jobs, return_as="generator_unordered", batch_size=1)
+    if scheduler is None:
+        yield parallel()
+        return
     need("cluster")
     from distributed import Client
 
     with Client(scheduler), joblib.parallel_config("dask"):
-        yield
+        yield parallel(timeout=PATIENCE)
 
 
 def missing(table, claims, ids, seeds):

@@ -3,7 +3,7 @@
 from functools import cache, lru_cache
 from itertools import permutations
 from math import inf, nan
-from time import perf_counter
+from timeit import repeat
 
 import numpy as np
 from scipy.optimize import linprog
@@ -39,14 +39,9 @@ def time(seed, objects=50):
     return {"seconds": least_time(lambda: match(before, after, method="literal"))}
 
 
-def least_time(do, times=3):
+def least_time(do):
     """Time in s that something takes, the best of three."""
-    taken = []
-    for _ in range(times):
-        start = perf_counter()
-        do()
-        taken.append(perf_counter() - start)
-    return min(taken)
+    return min(repeat(do, number=1, repeat=3))
 
 
 @claim(
@@ -63,12 +58,11 @@ def optimal(seed):
     Ten objects: beside a linear program. Two objects: beside all bijections of eight corners.
     """
     rng = np.random.default_rng([seed, 16])
-    ten = random_layouts(10, rng, room=12.0)[:2]
-    two = random_layouts(2, rng, room=6.0)[:2]
-    costs = integer_costs(ten[0].corners, ten[1].corners)
-    by_program = assignment_program(costs)
-    few = integer_costs(two[0].corners, two[1].corners)
-    best = few[np.arange(8), bijections(8)].sum(axis=1).min()
+    *ten, _ = random_layouts(10, rng, room=12.0)
+    *two, _ = random_layouts(2, rng, room=6.0)
+    by_program = assignment_program(integer_costs(*(each.corners for each in ten)))
+    costs = integer_costs(*(each.corners for each in two))
+    best = costs[np.arange(8), bijections(8)].sum(axis=1).min()
     return {
         "program_off": abs(by_program.fun - match(*ten, method="literal").cost),
         "fractional": np.abs(by_program.x - by_program.x.round()).max(),

@@ -4,7 +4,7 @@ Some experiments draw subgoals of a known task, for only there the truth is know
 slaloms that were walked, seen by the laser and segmented.
 """
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import nan
 from types import SimpleNamespace
 
@@ -83,12 +83,16 @@ def subgoals(seed, numbers=(1, 2, 5, 10)):
     cones, 0.75 m from their centres, of one demonstration minus of two.
     """
     truth = np.array(TASKS["slalom"])
-    errors = errors_by_number(truth, numbers, lambda n: drawn(truth, n, [seed, n], SPREAD))
+
+    def drawn(n, spread=SPREAD):
+        return draw_demonstrations(truth, n, spread, seed=[seed, n])
+
+    errors = errors_by_number(truth, numbers, drawn)
     told = {f"error_{n}_m": error for n, error in errors.items()}
     told |= {"two_more_than_ten_m": errors[2] - errors[10], "exponent": exponent(errors)}
     for name, draw in (
-        ("half", lambda n: drawn(truth, n, [seed, n], SPREAD / 2)),
-        ("twice", lambda n: drawn(truth, n, [seed, n], 2 * SPREAD)),
+        ("half", partial(drawn, spread=SPREAD / 2)),
+        ("twice", partial(drawn, spread=2 * SPREAD)),
         ("tails", lambda n: drawn_with_tails(truth, n, [seed, 18, n])),
     ):
         wrong = errors_by_number(truth, (2, 10), draw)
@@ -108,13 +112,8 @@ def exponent(errors):
     return np.polyfit(*np.log(np.array(found)).T, 1)[0] if len(found) > 1 else nan
 
 
-def drawn(truth, n, seed, spread):
-    """Demonstrations whose subgoals scatter normally, one too many in 30 % of them."""
-    return draw_demonstrations(truth, n, spread, seed=seed)
-
-
 def drawn_with_tails(truth, n, seed):
-    """The same with the tails of Student's t of three degrees of freedom, its scale the spread."""
+    """Demonstrations that scatter by Student's t of three degrees of freedom."""
     rng = np.random.default_rng(seed)
     exact = draw_demonstrations(truth, n, 0.0, seed=rng)
     return [subgoals + SPREAD * rng.standard_t(3, subgoals.shape) for subgoals in exact]
