@@ -5,7 +5,8 @@ import struct
 
 import numpy as np
 
-from dollop.formats.files import FormatError, read_bytes, whole_file
+from dollop.checks import checked_array
+from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
 
 __all__ = ["OCCUPIED_FROM", "read_map", "write_map"]
 
@@ -45,23 +46,26 @@ def read_map(path):
         If label, chunks, sizes or probabilities are not what they should be.
     """
     content = read_bytes(path)
-    start = content.find(MAP_LABEL)
-    if start < 0 or not all(line[:1] in (b"#", b"") for line in content[:start].split(b"\n")):
+    head = re.match(rb"((#.*)?\n)*" + MAP_LABEL, content)
+    if not head:
         raise FormatError(f"no {MAP_LABEL.decode()} after the comment lines", path)
-    body = _gridmap_chunk(path, content, start + len(MAP_LABEL))
+    body = _gridmap_chunk(path, content, head.end())
     if len(body) < 12:
         raise FormatError("the gridmap chunk is cut short", path)
     width, height, resolution = struct.unpack_from("<iif", body)
-    if not (width > 0 and height > 0 and 0 < resolution < np.inf and len(body) == 12 + 4 * width * height):
-        raise FormatError(f"{width} x {height} cells of {resolution} m do not fit a chunk of {len(body)} bytes", path)
+    fits = len(body) == 12 + 4 * width * height
+    if not (fits and width > 0 and height > 0 and 0 < resolution < np.inf):
+        cells = f"{width} x {height} cells of {resolution} m"
+        raise FormatError(f"{cells} do not fit a chunk of {len(body)} bytes", path)
     # float32 turns 0.1 into 0.10000000149; seven digits are all it holds.
     resolution = float(f"{resolution:.7g}")
     occupancy = np.frombuffer(body, "<f4", offset=12).reshape(width, height).T.astype(float)
     wrong = ~((occupancy == -1) | ((occupancy >= 0) & (occupancy <= 1)))
     if wrong.any():
-        raise FormatError(f"an occupancy must be in [0, 1], or -1 where unknown, got {occupancy[wrong][0]}", path)
+        rule = "an occupancy must be in [0, 1], or -1 where unknown"
+        raise FormatError(f"{rule}, got {occupancy[wrong][0]}", path)
     occupancy[occupancy == -1] = np.nan
-    return occupancy, _map_origin(path, content[:start], resolution), resolution
+    return occupancy, _map_origin(path, head[0], resolution), resolution
 
 
 def _gridmap_chunk(path, content, place):
@@ -69,7 +73,8 @@ def _gridmap_chunk(path, content, place):
     while place + 5 <= len(content):
         kind, size = struct.unpack_from("<Bi", content, place)
         if size < 0 or place + 5 + size > len(content):
-            raise FormatError(f"a chunk of {size} bytes at byte {place} runs past the end of the file", path)
+            chunk = f"a chunk of {size} bytes at byte {place}"
+            raise FormatError(f"{chunk} runs past the end of the file", path)
         chunk = content[place + 15 : place + 5 + size]
         if kind & ~NAMED_CHUNK == GRIDMAP_CHUNK:
             return chunk.partition(b"\0")[2] if kind & NAMED_CHUNK else chunk
@@ -77,15 +82,13 @@ def _gridmap_chunk(path, content, place):
     raise FormatError("no gridmap chunk in the file", path)
 
 
-def _map_origin(path, comments, resolution):
-    found = re.search(rb"^# Lower left    : (.*)$", comments, re.MULTILINE)
+def _map_origin(path, head, resolution):
+    """Lower left corner in m, which `write_map` keeps in a comment."""
+    found = re.search(rb"^# Lower left    : (.*)$", head, re.MULTILINE)
     if not found:
         return -resolution / 2, -resolution / 2
-    try:
-        x, y = (float(value) for value in found[1].split())
-    except ValueError:
-        raise FormatError(f"the lower left corner must be two numbers, got {found[1]!r}", path) from None
-    return x, y
+    corner = from_file(path, checked_array, "the lower left corner", found[1].split(), 2)
+    return tuple(corner.tolist())
 
 
 def write_map(path, occupancy, origin, resolution):

@@ -3,12 +3,14 @@
 import codecs
 import gzip
 import os
+import sys
 import tempfile
+import warnings
 import zlib
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["FormatError", "check_writable", "read_bytes", "whole_file"]
+__all__ = ["FormatError", "check_writable", "from_file", "read_bytes", "warn_of", "whole_file"]
 
 MAX_BYTES = 1 << 30
 
@@ -27,14 +29,62 @@ class FormatError(ValueError):
     """
 
     def __init__(self, message, path, line=None):
-        self.path, self.line = str(path), line
-        place = self.path if line is None else f"{self.path}, line {line}"
+        place = path if line is None else f"{path}, line {line}"
         super().__init__(f"{place}: {message}")
 
 
+def from_file(path, make, *content):
+    """What is made of a file's content; what is refused in making it is the file's fault.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    make : callable
+        A record, or a check.
+    *content : object
+        What it takes.
+
+    Returns
+    -------
+    object
+        What it makes.
+
+    Raises
+    ------
+    FormatError
+        If it raises ValueError: the same message, after the name of the file.
+
+    Examples
+    --------
+    >>> from_file("walk.txt", float, "12 m")
+    Traceback (most recent call last):
+    dollop.formats.files.FormatError: walk.txt: could not convert string to float: '12 m'
+    """
+    try:
+        return make(*content)
+    except ValueError as error:
+        raise FormatError(str(error), path) from None
+
+
+def warn_of(path, text):
+    """Warn of a file, at the line outside of this library that asked for it.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    text : str
+        What is wrong with it.
+    """
+    frame, depth = sys._getframe(), 1
+    while frame.f_back and frame.f_globals["__name__"].startswith("dollop."):
+        frame, depth = frame.f_back, depth + 1
+    warnings.warn(f"{path}: {text}", stacklevel=depth)
+
+
 def read_bytes(path):
-    """Whole content of a file, unpacked where it is gzipped (told by its first two bytes, not by
-    its name).
+    """Whole content of a file, unpacked if it is gzipped (told by its first bytes, not its name).
 
     A byte order mark, which some editors put before UTF-8 text, is left out.
 
@@ -46,12 +96,12 @@ def read_bytes(path):
     Returns
     -------
     bytes
+        At least one.
 
     Raises
     ------
     FormatError
-        If the file is empty, its gzip stream is cut short or damaged, or it holds more than
-        `MAX_BYTES` (1 GiB).
+        If the file is empty, its gzip stream is cut short or damaged, or it holds more than 1 GiB.
     """
     with open(path, "rb") as stream:
         zipped = stream.read(2) == b"\x1f\x8b"
@@ -68,7 +118,18 @@ def read_bytes(path):
 
 
 def check_writable(path):
-    """Raise OSError now, with the file's name, if a file `path` could not be written later."""
+    """Refuse now, with the file's name, what could not be written later.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file that is to be written.
+
+    Raises
+    ------
+    OSError
+        If there is a folder of this name, or none to put the file into.
+    """
     path = Path(path)
     if path.is_dir():
         raise IsADirectoryError(f"{path} cannot be written: it is a folder")
@@ -80,10 +141,37 @@ def check_writable(path):
 
 @contextmanager
 def whole_file(path, mode="wb"):
-    """Open a temporary neighbour of `path` for writing; it takes the name `path` only when all went
-    well.
+    """A temporary neighbour of a file, open for writing; it takes its name only if all goes well.
 
     Of two such files, one within the other, none takes its name before both are written.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file that is to be written, or replaced.
+    mode : str
+        As in `open`.
+
+    Yields
+    ------
+    file object
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; of what is raised while it is open, only the file's name is changed.
+
+    Examples
+    --------
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     try:
+    ...         with whole_file(f"{folder}/a.txt") as stream:
+    ...             stream.write(b"half of it, th")
+    ...             raise KeyboardInterrupt
+    ...     except KeyboardInterrupt:
+    ...         os.listdir(folder)
+    14
+    []
     """
     path = Path(path)
     check_writable(path)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dollop.formats import carmen_log
+from dollop.formats import carmen_log, ros_bag
 from dollop.formats.files import FormatError
 
 __all__ = ["read_log", "write_log"]
@@ -39,8 +39,6 @@ def read_log(path, topic=None):
     if not path.exists():
         raise FileNotFoundError(f"no such file: {path}")
     if path.is_dir() or path.name.endswith(ROS_SUFFIXES):
-        from dollop.formats import ros_bag
-
         return ros_bag.read_log(path, topic)
     _check_is_carmen(path)
     if topic is not None:

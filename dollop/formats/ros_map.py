@@ -11,8 +11,9 @@ import numpy as np
 import yaml
 from PIL import Image
 
+from dollop.checks import check_choice
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.formats.files import FormatError, read_bytes, whole_file
+from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
 
 __all__ = ["read_map", "write_map"]
 
@@ -23,6 +24,13 @@ RIGHT_ANGLED = 1e-6
 """A turn in rad that counts as none: it moves what is a hundred metres away by a tenth of a
 millimetre.
 """
+
+
+USUAL = {
+    **{"image": None, "origin": None, "resolution": None, "mode": "trinary", "negate": 0},
+    **{"occupied_thresh": 0.65, "free_thresh": 0.196},
+}
+"""What a key means that is missing; the first three must not be."""
 
 
 def write_map(path, occupancy, origin, resolution):
@@ -40,21 +48,16 @@ def write_map(path, occupancy, origin, resolution):
         Side of a cell in m.
     """
     image = path.with_suffix(".pgm")
-    grey = np.rint(255 * (1 - np.nan_to_num(occupancy)))
-    occupied = occupancy >= OCCUPIED_FROM
-    grey = np.where(occupied, np.minimum(grey, UNKNOWN_GREY[0] - 1), np.maximum(grey, UNKNOWN_GREY[1] + 1))
-    grey = np.where(np.isnan(occupancy), UNKNOWN_GREY[0], grey).astype(np.uint8)
-    keys = {
-        "image": image.name,
-        "mode": "trinary",
-        "resolution": float(resolution),
-        "origin": [float(origin[0]), float(origin[1]), 0.0],
-        "negate": 0,
-        "occupied_thresh": 0.505,
-        "free_thresh": 0.495,
-    }
+    grey, (low, high) = np.rint(255 * (1 - occupancy)), UNKNOWN_GREY
+    occupied, free = occupancy >= OCCUPIED_FROM, occupancy < OCCUPIED_FROM
+    sides = np.minimum(grey, low - 1), np.maximum(grey, high + 1)
+    grey = np.select([occupied, free], sides, low).astype(np.uint8)
+    place = {"resolution": float(resolution), "origin": [*map(float, origin), 0.0]}
+    meaning = {"negate": 0, "occupied_thresh": 0.505, "free_thresh": 0.495}
+    keys = {"image": image.name, "mode": "trinary", **place, **meaning}
+    layout = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True}
     with whole_file(path) as stream, whole_file(image) as picture:
-        stream.write(yaml.safe_dump(keys, sort_keys=False, default_flow_style=None, allow_unicode=True).encode())
+        stream.write(yaml.safe_dump(keys, **layout).encode())
         stream.flush()  # so that nothing is left to fail once the picture has its name
         Image.fromarray(grey[::-1]).save(picture, "PPM")
 
@@ -82,14 +85,12 @@ def read_map(path):
     FormatError
         If the YAML or its picture is not in order.
     """
-    keys = _read_keys(path)
-    for key in ("image", "resolution", "origin"):
-        if key not in keys:
-            raise FormatError(f"the key {key!r} is missing", path)
+    keys = USUAL | _read_keys(path)
     origin = keys["origin"] if isinstance(keys["origin"], list) else []
     origin = [_number(path, "origin", value) for value in origin]
     if len(origin) != 3 or not abs(origin[2]) <= RIGHT_ANGLED:
-        raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {keys['origin']!r}", path)
+        rule = "origin must be [x, y, 0] (a turned map is not supported)"
+        raise FormatError(f"{rule}, got {keys['origin']!r}", path)
     resolution = _number(path, "resolution", keys["resolution"])
     grey = _read_grey(path, str(keys["image"]))[::-1]
     return _probabilities(path, keys, grey), origin[:2], resolution
@@ -107,12 +108,10 @@ def _read_keys(path):
 
 
 def _number(path, key, value):
-    """The value as a float: YAML takes 1e-9, without a point, for text."""
+    """The value as a float: to YAML 1e-9, without a point, is text, and yes is no number."""
     try:
-        if isinstance(value, bool):
-            raise ValueError
-        return float(value)
-    except (TypeError, ValueError):
+        return float(str(value))
+    except ValueError:
         raise FormatError(f"{key} must be a number, got {value!r}", path) from None
 
 
@@ -140,14 +139,10 @@ def _probabilities(path, keys, grey):
     """Probabilities by the map's `mode`, set so that occupied and free cells are what the file's
     thresholds say.
     """
-    mode, negate = keys.get("mode", "trinary"), keys.get("negate", 0)
-    if mode not in ("trinary", "scale", "raw"):
-        raise FormatError(f"mode must be trinary, scale or raw, got {mode!r}", path)
-    if negate not in (0, 1):  # or false and true
-        raise FormatError(f"negate must be 0, 1, false or true, got {negate!r}", path)
-    above, below = (
-        _number(path, key, keys.get(key, usual)) for key, usual in (("occupied_thresh", 0.65), ("free_thresh", 0.196))
-    )
+    mode, negate = keys["mode"], keys["negate"]
+    from_file(path, check_choice, "mode", mode, ("trinary", "scale", "raw"))
+    from_file(path, check_choice, "negate", negate, (0, 1))  # or false and true
+    below, above = (_number(path, key, keys[key]) for key in ("free_thresh", "occupied_thresh"))
     if not 0 <= below <= above <= 1:
         rule = "thresholds must be 0 <= free_thresh <= occupied_thresh <= 1"
         raise FormatError(f"{rule}, got free_thresh {below:g} and occupied_thresh {above:g}", path)
@@ -155,7 +150,6 @@ def _probabilities(path, keys, grey):
         return np.where(grey <= 100, grey / 100, np.nan)
     probability = (grey if negate else 255 - grey) / 255
     occupied, free = probability > above, probability < below
-    between = np.nan if mode == "trinary" else probability
     just_free = np.nextafter(OCCUPIED_FROM, 0)
-    certain = np.where(occupied, np.maximum(probability, OCCUPIED_FROM), np.minimum(probability, just_free))
-    return np.where(occupied | free, certain, between)
+    sides = np.maximum(probability, OCCUPIED_FROM), np.minimum(probability, just_free)
+    return np.select([occupied, free], sides, np.nan if mode == "trinary" else probability)

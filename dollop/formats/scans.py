@@ -1,13 +1,14 @@
 """What the readers of laser scans share: how much is forgiven, and a clock that can be used."""
 
-import warnings
 from bisect import bisect_left
+from collections import Counter
+from typing import NamedTuple
 
 import numpy as np
 
-from dollop.formats.files import FormatError
+from dollop.formats.files import FormatError, warn_of
 
-__all__ = ["forgive", "longest_rise", "usable_clock"]
+__all__ = ["Beams", "Scan", "forgive", "longest_rise", "usable_scans"]
 
 NOMINAL_RATE = 10.0
 """Scans per second of a SICK LMS 200 at 1 degree and 38400 baud: what a log without a usable clock
@@ -17,6 +18,98 @@ LONGEST_GAP = 3600.0
 """Seconds without a scan from which on it is the clock that jumped: no log of a demonstration rests
 for an hour.
 """
+
+
+class Beams(NamedTuple):
+    """What must not change within a log: the geometry of its scans.
+
+    Attributes
+    ----------
+    count : int
+        Beams of a scan.
+    start, step : float
+        First bearing, and from one beam to the next, in rad.
+    max_range : float or None
+        In m; None where the file does not state it.
+    is_sick : bool
+        Whether the laser has the error codes of a SICK.
+    """
+
+    count: int
+    start: float
+    step: float
+    max_range: float | None
+    is_sick: bool = False
+
+    def __str__(self):
+        reach = "" if self.max_range is None else f" up to {self.max_range:g} m"
+        return f"{self.count} beams from {self.start:.4g} rad, {self.step:.4g} rad apart{reach}"
+
+    @property
+    def angles(self):
+        """(count,) float array of bearings in rad, in the order of the file."""
+        return self.start + self.step * np.arange(self.count)
+
+
+class Scan(NamedTuple):
+    """One scan as its file holds it.
+
+    Attributes
+    ----------
+    beams : Beams
+        Its geometry.
+    ranges : (B,) float array
+        In m.
+    pose : (3,) sequence of float
+        Sensor in the world: x, y in m, theta in rad.
+    t : float
+        Time in s.
+    """
+
+    beams: Beams
+    ranges: np.ndarray
+    pose: tuple
+    t: float
+
+
+def usable_scans(path, scans, bad):
+    """Scans of one geometry, that of most, with times that increase.
+
+    A few others, and a few broken ones, are left out with a warning (`forgive`). A scan is out of
+    order where the clock runs backwards, and where it is farther than an hour from the scan before
+    and the scan after. Where at most one scan in twenty is out of order those are left out, with a
+    warning. Otherwise the clock is worthless: all scans are kept, in the order of the file, and
+    timed at 10 Hz, with the warning that speeds mean nothing. A jump forwards that lasts is only
+    warned of: either side of it is in order.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, for messages.
+    scans : dict of int to Scan
+        The readable scans by their place in the file, in order; at least one.
+    bad : dict of int to str
+        The reason of every scan that is broken.
+
+    Returns
+    -------
+    scans : list of K Scan
+        All of the same `beams`.
+    t : (K,) float array
+        Their times in s, strictly increasing.
+
+    Raises
+    ------
+    FormatError
+        If there are too many broken and other scans.
+    """
+    beams = Counter(scan.beams for scan in scans.values()).most_common(1)[0][0]
+    other = {place: scan.beams for place, scan in scans.items() if scan.beams != beams}
+    odd = {place: f"{each}, where most scans have {beams}" for place, each in other.items()}
+    forgive(path, bad | odd, len(scans) + len(bad))
+    alike = [scan for scan in scans.values() if scan.beams == beams]
+    keep, t = _usable_clock(path, np.array([scan.t for scan in alike]))
+    return [alike[i] for i in keep], t
 
 
 def forgive(path, bad, total):
@@ -30,8 +123,8 @@ def forgive(path, bad, total):
     ----------
     path : str or Path
         The file, for the message.
-    bad : list of (int, str)
-        Line and reason of every broken scan, in the order of the file.
+    bad : dict of int to str
+        The reason of every broken scan, by its line.
     total : int
         Scans in the file, the broken ones included.
 
@@ -42,19 +135,23 @@ def forgive(path, bad, total):
     """
     if not bad:
         return
-    line, reason = bad[0]
+    line = min(bad)
     if total < 20 or len(bad) > max(1, total // 100):
-        raise FormatError(f"{reason} ({len(bad)} of {total} scans are broken)", path, line)
-    message = f"{path}: left out {len(bad)} broken of {total} scans, the first on line {line}: {reason}"
-    warnings.warn(message, stacklevel=4)
+        raise FormatError(f"{bad[line]} ({len(bad)} of {total} scans are broken)", path, line)
+    lost = f"left out {len(bad)} broken of {total} scans, the first on line {line}"
+    warn_of(path, f"{lost}: {bad[line]}")
 
 
 def longest_rise(values):
     """Indices of a longest strictly increasing subsequence.
 
+    By patience sorting (M. L. Fredman, "On computing the length of longest increasing
+    subsequences", 1975).
+
     Parameters
     ----------
     values : (N,) sequence of float
+        In any unit.
 
     Returns
     -------
@@ -66,60 +163,39 @@ def longest_rise(values):
     >>> longest_rise([0.0, 0.1, 99.0, 0.2, 0.3]).tolist()  # the odd one goes, wherever it points
     [0, 1, 3, 4]
     """
-    # Patience sorting (Fredman 1975): smallest end of a rise of each length, where it stands, and
-    # what precedes it.
+    # Smallest end of a rise of each length, where it stands, and what precedes it.
     ends, places, before = [], [], []
     for i, value in enumerate(values):
         k = bisect_left(ends, value)
         before.append(places[k - 1] if k else -1)
         ends[k : k + 1], places[k : k + 1] = [value], [i]
-    chosen = [places[-1]] if places else []
+    chosen = places[-1:]
     while chosen and before[chosen[-1]] >= 0:
         chosen.append(before[chosen[-1]])
     return np.array(chosen[::-1], dtype=int)
 
 
-def usable_clock(path, t):
-    """Decide what to do about a clock that stands still, runs backwards or jumps, and warn of it.
-
-    A scan is out of order where the clock runs backwards, and where it is farther than
-    `LONGEST_GAP` from the scan before and the scan after. Where at most one scan in twenty is out
-    of order those are left out. Otherwise the clock is worthless: all scans are kept, in the order
-    of the file, and numbered at `NOMINAL_RATE`; speeds then mean nothing. A jump forwards that
-    lasts is only warned of: either side of it is in order.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file, for the warning.
-    t : (T,) float array
-        Times as recorded, in s.
-
-    Returns
-    -------
-    keep : (K,) int array
-        Which scans stay.
-    t : (K,) float array
-        Their times in s, strictly increasing.
-    """
+def _usable_clock(path, t):
+    """Which of the scans recorded at `t` (T,) stay, (K,), and their times (K,): see `usable_scans`."""
     keep = _without_strays(t, longest_rise(t))
     lost = len(t) - len(keep)
-    if lost * 20 <= len(t):
-        if lost:
-            text = f"left out {lost} of {len(t)} scans, which the clock puts out of order"
-            warnings.warn(f"{path}: {text}", stacklevel=4)
-        gap = np.diff(t[keep]).max(initial=0)
-        if gap > LONGEST_GAP:
-            warnings.warn(f"{path}: the clock jumps by {gap:g} s from one scan to the next", stacklevel=4)
-        return keep, t[keep]
-    text = f"the clock stands still or runs backwards ({lost} of {len(t)} scans are out of order), so the scans are"
-    warnings.warn(f"{path}: {text} timed at {NOMINAL_RATE:g} Hz; speeds mean nothing", stacklevel=4)
-    return np.arange(len(t)), np.arange(len(t)) / NOMINAL_RATE
+    if lost * 20 > len(t):
+        out = f"{lost} of {len(t)} scans are out of order"
+        consequence = f"so the scans are timed at {NOMINAL_RATE:g} Hz; speeds mean nothing"
+        warn_of(path, f"the clock stands still or runs backwards ({out}), {consequence}")
+        return np.arange(len(t)), np.arange(len(t)) / NOMINAL_RATE
+    if lost:
+        warn_of(path, f"left out {lost} of {len(t)} scans, which the clock puts out of order")
+    gap = np.diff(t[keep]).max(initial=0)
+    if gap > LONGEST_GAP:
+        warn_of(path, f"the clock jumps by {gap:g} s from one scan to the next")
+    return keep, t[keep]
 
 
 def _without_strays(t, keep):
-    """`keep` (K,), increasing in `t`, without the few scans that are far from both neighbours; an
-    end has but one.
+    """`keep` (K,), increasing in `t`, without the few scans that are far from both neighbours.
+
+    The first and the last have but one neighbour.
     """
     far = np.diff(t[keep], prepend=-np.inf, append=np.inf) > LONGEST_GAP
     stray = far[:-1] & far[1:]

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from dollop.formats import files
-from dollop.formats.files import FormatError, check_writable, read_bytes, whole_file
+from dollop.formats.files import FormatError, check_writable, from_file, read_bytes, warn_of, whole_file
 
 
 def test_error_names_file_and_line():
     """A FormatError is a ValueError whose text starts with the file and the line."""
     error = FormatError("range must be positive, got -1", "walk.log", 7)
     assert str(error) == "walk.log, line 7: range must be positive, got -1"
-    assert isinstance(error, ValueError) and error.line == 7
+    assert isinstance(error, ValueError)
 
 
 def test_whole_file_keeps_the_old_content_on_failure(tmp_path):
@@ -95,3 +95,19 @@ def test_written_files_can_be_read_by_others(tmp_path):
         stream.write(b"new")
     (tmp_path / "plain.txt").write_text("new")
     assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "plain.txt").stat().st_mode
+
+
+def test_what_a_check_refuses_is_the_fault_of_the_file():
+    """A ValueError gets the file's name; what is right passes, and other errors keep their type."""
+    assert from_file("a.txt", float, "1.5") == 1.5
+    with pytest.raises(FormatError, match=r"^a\.txt: could not convert string to float: 'x'$"):
+        from_file("a.txt", float, "x")
+    with pytest.raises(TypeError):
+        from_file("a.txt", float, [])
+
+
+def test_a_warning_points_at_who_asked_for_the_file():
+    """However deep in the library it arises, the place is outside of it."""
+    with pytest.warns(UserWarning, match=r"^a\.txt: odd$") as record:
+        warn_of("a.txt", "odd")
+    assert record[0].filename == __file__

@@ -50,7 +50,7 @@ def test_carmen_logs_have_no_topics(tmp_path):
 
 def test_bags_without_rosbags_say_what_to_install(tmp_path, monkeypatch):
     """Without the extra, a bag gives the command that installs it."""
-    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    monkeypatch.setitem(sys.modules, "rosbags", None)
     (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n")
     with pytest.raises(ImportError, match=r'pip install "dollop\[ros\]"'):
         read_log(tmp_path / "a.bag")
@@ -74,5 +74,6 @@ def test_real_logs(name, shape, max_range, warning, recwarn):
     assert log.ranges.shape == shape
     assert log.max_range == pytest.approx(max_range, rel=1e-6)
     assert 0.01 < np.isinf(log.ranges).mean() < 0.7
+    assert all(warning.filename == __file__ for warning in recwarn)
     messages = [str(w.message) for w in recwarn]
     assert len(messages) == (warning is not None) and all(warning in message for message in messages)

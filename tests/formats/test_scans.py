@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dollop.formats.files import FormatError
-from dollop.formats.scans import forgive, longest_rise, usable_clock
+from dollop.formats.scans import Beams, Scan, _usable_clock, forgive, longest_rise, usable_scans
 
 
 @given(st.lists(st.integers(0, 5), max_size=8))
@@ -30,17 +30,17 @@ def test_longest_rise_is_as_long_as_brute_force(values):
 def test_one_broken_scan_in_a_long_log_is_forgiven():
     """One of 20, or three of 300, are left out with a single warning that counts them and names the first line."""
     with pytest.warns(UserWarning, match="left out 1 broken of 20 scans, the first on line 3: odd") as record:
-        forgive("a.log", [(3, "odd")], 20)
+        forgive("a.log", {3: "odd"}, 20)
     assert len(record) == 1
     with pytest.warns(UserWarning, match="left out 3 broken of 300"):
-        forgive("a.log", [(3, "odd"), (5, "odd"), (9, "odd")], 300)
+        forgive("a.log", {5: "odd", 3: "odd", 9: "odd"}, 300)
 
 
 @pytest.mark.parametrize(("bad", "total"), [(1, 19), (2, 100), (4, 300), (50, 100)])
 def test_many_broken_scans_are_not_forgiven(bad, total):
     """More than one scan in a hundred, or any in a short log, is an error with the first broken line."""
     with pytest.raises(FormatError, match=rf"a.log, line 3: odd \({bad} of {total}"):
-        forgive("a.log", [(3 + i, "odd") for i in range(bad)], total)
+        forgive("a.log", {3 + i: "odd" for i in range(bad)}, total)
 
 
 def test_a_good_clock_is_left_alone():
@@ -48,7 +48,7 @@ def test_a_good_clock_is_left_alone():
     t = np.array([5.0, 5.1, 5.3])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        keep, kept = usable_clock("a.log", t)
+        keep, kept = _usable_clock("a.log", t)
     assert keep.tolist() == [0, 1, 2] and np.array_equal(kept, t)
 
 
@@ -57,7 +57,7 @@ def test_a_stray_time_costs_one_scan():
     t = np.arange(100) * 0.1
     t[3] = 1e9
     with pytest.warns(UserWarning, match="left out 1 of 100 scans"):
-        keep, kept = usable_clock("a.log", t)
+        keep, kept = _usable_clock("a.log", t)
     assert len(keep) == 99 and 3 not in keep and np.all(np.diff(kept) > 0)
 
 
@@ -67,7 +67,7 @@ def test_a_scan_far_from_both_neighbours_is_left_out(stray, time):
     t = np.arange(100) * 0.1
     t[stray] = time
     with pytest.warns(UserWarning, match="left out 1 of 100 scans, which the clock puts out of order") as record:
-        keep, kept = usable_clock("a.log", t)
+        keep, kept = _usable_clock("a.log", t)
     assert keep.tolist() == [i for i in range(100) if i != stray] and np.array_equal(kept, t[keep])
     assert len(record) == 1
 
@@ -76,7 +76,7 @@ def test_a_lasting_jump_is_told():
     """A clock that is set forwards for good leaves every scan in order, with a warning of the jump."""
     t = np.arange(100) * 0.1 + 1e6 * (np.arange(100) >= 50)
     with pytest.warns(UserWarning, match="the clock jumps by 1e.06 s") as record:
-        keep, kept = usable_clock("a.log", t)
+        keep, kept = _usable_clock("a.log", t)
     assert len(keep) == 100 and np.array_equal(kept, t) and len(record) == 1
 
 
@@ -84,7 +84,7 @@ def test_a_lasting_jump_is_told():
 def test_a_useless_clock_is_replaced_and_said_so(t):
     """All zero, running backwards or reset in the middle: every scan is kept, at the nominal rate, with a warning."""
     with pytest.warns(UserWarning, match="timed at 10 Hz; speeds mean nothing"):
-        keep, kept = usable_clock("a.log", t)
+        keep, kept = _usable_clock("a.log", t)
     assert len(keep) == 50
     np.testing.assert_allclose(kept, np.arange(50) * 0.1)
 
@@ -95,5 +95,28 @@ def test_one_scan_in_twenty_may_be_out_of_order(scans, kept):
     t = 5 + np.arange(scans) * 0.5
     t[3] = 1e9
     with pytest.warns(UserWarning):
-        keep, times = usable_clock("a.log", t)
+        keep, times = _usable_clock("a.log", t)
     assert len(keep) == kept and times[-1] == (t[-1] if scans == 20 else 1.8)
+
+
+def scans_of(counts):
+    """Scans of so many beams each, a tenth of a second apart, by the lines 1, 3, 5, ..."""
+    beams = [Beams(count, -1.5, 0.1, 8.0) for count in counts]
+    scans = [Scan(each, np.ones(each.count), (0, 0, 0), i / 10) for i, each in enumerate(beams)]
+    return dict(zip(range(1, 2 * len(scans), 2), scans, strict=True))
+
+
+def test_scans_of_another_geometry_are_left_out():
+    """Those of most stay, with their times; what is broken otherwise counts with them."""
+    with pytest.warns(UserWarning, match="left out 1 broken of 30 scans, the first on line 5: 4 beams .*have 3 beams"):
+        scans, t = usable_scans("a.log", scans_of([3, 3, 4, *[3] * 27]), {})
+    assert {scan.beams.count for scan in scans} == {3}
+    assert t.tolist() == [i / 10 for i in range(30) if i != 2]
+    with pytest.raises(FormatError, match=r"a\.log, line 2: cut off \(2 of 31 scans are broken\)"):
+        usable_scans("a.log", scans_of([3, 3, 4, *[3] * 27]), {2: "cut off"})
+
+
+def test_bearings_follow_from_start_and_step():
+    """One per beam, whichever way the laser turns."""
+    assert Beams(3, 1.0, -0.5, None).angles.tolist() == [1.0, 0.5, 0.0]
+    assert str(Beams(3, 1.0, -0.5, None)) == "3 beams from 1 rad, -0.5 rad apart"
