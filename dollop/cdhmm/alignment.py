@@ -4,10 +4,13 @@ Best-first merging alone can err early, where a path crosses itself or an odd su
 later one, and what it merged then keeps other pairs apart. So two moves follow, kept only if the
 evidence grows: all demonstrations are taken out and aligned with the growing graph one after
 another, and each is aligned afresh with what the others built.
+
+Throughout, *labels* (M,) are the nodes of all subgoals, and *chains* are those subgoals, as
+`dollop.cdhmm.evidence.chains_of` has them.
 """
 
-from collections import deque
 from fractions import Fraction
+from itertools import cycle
 
 import numpy as np
 
@@ -18,62 +21,34 @@ from dollop.cdhmm.evidence import (
     START,
     Graph,
     emission_evidence,
-    emission_table,
     evidence_of,
     graph_of,
     outer_products,
-    steps_of,
     transition_evidence,
 )
 from dollop.cdhmm.merging import merge_states, topological_order
 
-__all__ = [
-    "LEAST_COVERAGE",
-    "align_chain",
-    "coverage_of",
-    "earliest",
-    "estimate_structure",
-    "mean_place",
-    "numbered",
-    "path_through",
-    "set_apart",
-]
-
 LEAST_COVERAGE = 0.5  # of the states on the most-likely path: who visits fewer does something else
 
 
-def graph_without(graph, chain, points):
-    """The graph as it is without one demonstration, whose states are `chain` (L,) and subgoals
-    `points` (L, 2).
-    """
-    n, s, q, counts = graph.n.copy(), graph.s.copy(), graph.q.copy(), graph.counts.copy()
-    n[chain] -= 1  # a demonstration visits no state twice
-    s[chain] -= points
-    q[chain] -= outer_products(points)
-    counts[steps_of(chain)] -= 1
-    return Graph(n, s, q, counts)
-
-
-def emission_gains(graph, points, prior, table):
-    """What each subgoal adds to the evidence in each state (L, S), and in a state of its own (L,)."""
+def _emission_gains(graph, points, prior):
+    """What subgoals add to the evidence in each state (L, S), and in states of their own (L,)."""
     q, one = outer_products(points), np.ones(len(points), int)
-    before = emission_evidence(graph.n, graph.s, graph.q, prior, table)
-    after = emission_evidence(graph.n + 1, graph.s + points[:, None], graph.q + q[:, None], prior, table)
-    return after - before, emission_evidence(one, points, q, prior, table)
+    before = emission_evidence(graph.n, graph.s, graph.q, prior)
+    n, s, q_with = graph.n + 1, graph.s + points[:, None], graph.q + q[:, None]
+    return emission_evidence(n, s, q_with, prior) - before, emission_evidence(one, points, q, prior)
 
 
-def edge_gains(counts):
-    """What one more step adds to the evidence: along each edge u -> v (S, S), and along a new edge
-    from u (S,).
-    """
+def _edge_gains(counts):
+    """What one more step adds to the evidence: along each edge (S, S), and along a new one (S,)."""
     out, total = np.maximum((counts > 0).sum(1), 1), counts.sum(1)
     new = np.where(total > 0, np.log(out) - np.log(out + total) - np.log(out + total + 1), 0.0)
-    return np.where(counts > 0, np.log(counts + 1) - np.log(out + total)[:, None], new[:, None]), new
+    again = np.log(counts + 1) - np.log(out + total)[:, None]
+    return np.where(counts > 0, again, new[:, None]), new
 
 
-def align_chain(points, place, graph, prior, table):
-    """The states of a new demonstration that raise the evidence most: nodes (L,), -1 for a state of
-    its own; the gain.
+def align_chain(points, graph, labels, chains):
+    """The states of a new demonstration that raise the evidence most (Sec. V; reconstruction).
 
     Exact over all alignments that follow one topological order of the graph (so that it stays
     acyclic), because a demonstration visits a state at most once: each step of it adds its own
@@ -82,43 +57,58 @@ def align_chain(points, place, graph, prior, table):
 
         M_i(v) = emission_i(v) + max over u before v of { M_{i-1}(u) + edge(u, v),  N_{i-1}(u) }
         N_i(u) = emission_i(own) + max { M_{i-1}(u) + new edge(u),  N_{i-1}(u) }
+
+    Parameters
+    ----------
+    points : (L, 2) float array
+        The new subgoals in m, from the centre of the chains.
+    graph : Graph
+        Of S nodes, without the new demonstration.
+    labels, chains : (M,) int array and record
+        What the graph was made of.
+
+    Returns
+    -------
+    nodes : (L,) int array
+        -1 for a state of its own.
+    gain : float
+        Of evidence, in nats.
     """
-    order = np.array(topological_order(graph.counts, place))
+    order = np.array(topological_order(graph.counts, _mean_place(labels, chains, len(graph.n))))
     order = order[(graph.n[order] > 0) | (order < FIRST)]
-    edge, new = edge_gains(graph.counts[order[:, None], order])
-    onward = np.arange(len(order))[:, None] > np.arange(len(order))
-    shared, own = emission_gains(graph, points, prior, table)
+    edge, new = _edge_gains(graph.counts[order[:, None], order])
+    shared, own = _emission_gains(graph, points, chains.prior)
     shared[:, [START, END]] = -np.inf
-    chain, gain = best_alignment(shared[:, order], own, np.where(onward, edge.T, -np.inf), new)
-    return np.where(chain < 0, -1, order[chain]), gain
+    into = np.where(np.tri(len(order), k=-1, dtype=bool), edge.T, -np.inf)
+    places, gain = _best_alignment(shared[:, order], own, into, new)
+    return np.where(places < 0, -1, order[places]), gain
 
 
-def best_alignment(shared, own, into, new):
-    """The recursion of `align_chain` over nodes in topological order, START first; edges `into` v
-    from u (S, S).
+def _best_alignment(shared, own, into, new):
+    """The recursion of `align_chain` over nodes in topological order; edges `into` v from u (S, S).
+
+    START comes first and END last.
     """
     nodes, steps = np.arange(len(new)), []
     matched, apart = np.where(nodes == 0, 0.0, -np.inf), np.full(len(new), -np.inf)
     for i in range(len(own) + 1):
-        by_edge, anew = into + matched, best_before(apart)
+        by_edge, anew = into + matched, _best_before(apart)
         came = by_edge.argmax(1)
         direct, left = by_edge[nodes, came], matched + new
         steps.append((came, anew, direct >= apart[anew], left >= apart))
         arrived = np.maximum(direct, apart[anew])
         if i < len(own):
             matched, apart = shared[i] + arrived, own[i] + np.maximum(left, apart)
-    return trace_back(steps), float(arrived[-1])
+    return _trace_back(steps), float(arrived[-1])
 
 
-def best_before(values):
-    """For each place, where among those before it the highest value is (the first place gets
-    itself).
-    """
+def _best_before(values):
+    """For each place, where among those before it the highest value is; the first gets itself."""
     highest = np.where(values == np.maximum.accumulate(values), np.arange(len(values)), 0)
-    return np.concatenate([[0], np.maximum.accumulate(highest)[:-1]])
+    return np.append(0, np.maximum.accumulate(highest)[:-1])
 
 
-def trace_back(steps):
+def _trace_back(steps):
     """Follow the choices back from END: the node of each subgoal, -1 for a state of its own."""
     node, alone, chain = -1, False, []
     for came, anew, is_direct, just_left in reversed(steps):
@@ -130,165 +120,203 @@ def trace_back(steps):
     return np.array(chain[-2::-1], int)
 
 
-def realigned(k, labels, chains, graph, prior, table):
-    """Labels with demonstration k aligned afresh, and what that gains."""
-    part = chains.slices[k]
-    rest = graph_without(graph, labels[part], chains.points[part])
-    place = mean_place(labels, chains, len(graph.n), leave_out=part)
-    aligned, gain = align_chain(chains.points[part], place, rest, prior, table)
+def _taken_out(k, labels, chains, graph):
+    """The graph without demonstration k, and what that adds to the evidence where it lies."""
+    part, prior = chains.slices[k], chains.prior
+    chain, points = labels[part], chains.points[part]
+    n, s, q, counts = graph.n.copy(), graph.s.copy(), graph.q.copy(), graph.counts.copy()
+    n[chain] -= 1  # a demonstration visits no state twice
+    s[chain] -= points
+    q[chain] -= outer_products(points)
+    left = np.append(START, chain)
+    counts[left, np.append(chain, END)] -= 1
+    rest = Graph(n, s, q, counts)
+    both = rest, graph
+    emissions = [emission_evidence(g.n[chain], g.s[chain], g.q[chain], prior).sum() for g in both]
+    transitions = [transition_evidence(g.counts[left]).sum() for g in both]
+    return rest, emissions[1] - emissions[0] + transitions[1] - transitions[0]
+
+
+def _aligned(k, labels, chains, graph):
+    """Labels with demonstration k aligned with a graph without it, and what that gains."""
+    part, size = chains.slices[k], len(graph.n)
     renewed = labels.copy()
-    renewed[part] = np.where(aligned < 0, len(graph.n) + np.arange(len(aligned)), aligned)
-    return compact(renewed), gain - shared_evidence(labels[part], rest, graph, prior, table)
+    renewed[part] = START
+    nodes, gain = align_chain(chains.points[part], graph, renewed, chains)
+    renewed[part] = np.where(nodes < 0, size + np.arange(len(nodes)), nodes)
+    return renewed, gain
 
 
-def shared_evidence(chain, rest, graph, prior, table):
-    """What a demonstration adds to the evidence of the graph without it, `rest`, where it lies now."""
-    touched = np.array([START, *chain])
-    emissions = [emission_evidence(g.n[chain], g.s[chain], g.q[chain], prior, table).sum() for g in (rest, graph)]
-    transitions = [transition_evidence(g.counts[touched]).sum() for g in (rest, graph)]
-    return emissions[1] - emissions[0] + transitions[1] - transitions[0]
-
-
-def mean_place(labels, chains, size, leave_out=slice(0, 0)):
+def _mean_place(labels, chains, size):
     """Where in their demonstrations the subgoals of each node come on average: (S,), in (0, 1)."""
-    weight = np.ones(len(labels))
-    weight[leave_out] = 0
-    place = np.bincount(labels, weight * chains.place, size) / np.maximum(np.bincount(labels, weight, size), 1)
+    number = np.bincount(labels, minlength=size)
+    place = np.bincount(labels, chains.place, size) / np.maximum(number, 1)
     place[[START, END]] = 0, 1
     return place
 
 
-def compact(labels):
+def _compact(labels):
     """The same partition, its labels numbered without gaps from FIRST."""
     return np.unique(labels, return_inverse=True)[1].reshape(-1) + FIRST
 
 
-def worst_explained_first(labels, chains, graph, prior, table):
-    """Demonstrations in the order of what each adds to the evidence, per subgoal: an order that
-    hangs on content.
-    """
-    shares = []
-    for part in chains.slices:
-        rest = graph_without(graph, labels[part], chains.points[part])
-        shares.append(shared_evidence(labels[part], rest, graph, prior, table) / len(labels[part]))
-    return np.argsort(shares, kind="stable")
+def _worst_explained_first(labels, chains):
+    """Demonstrations by what each adds to the evidence per subgoal: an order by content."""
+    graph = graph_of(labels, chains)
+    added = [_taken_out(k, labels, chains, graph)[1] for k in range(len(chains.slices))]
+    return np.argsort(added / np.bincount(chains.owner), kind="stable")
 
 
-def realign(labels, chains, prior):
+def _realign(labels, chains):
     """Align every demonstration afresh, in turn, until none gains any more."""
-    table, graph = emission_table(prior, len(labels) + 1), graph_of(labels, chains)
-    turn, idle = deque(worst_explained_first(labels, chains, graph, prior, table)), 0
-    while idle < len(turn):
-        renewed, gain = realigned(turn[0], labels, chains, graph, prior, table)
-        if gain > LEAST_GAIN:
-            labels, graph = renewed, graph_of(renewed, chains)
-        idle = 0 if gain > LEAST_GAIN else idle + 1
-        turn.rotate(-1)
-    return labels
+    graph, idle = graph_of(labels, chains), 0
+    order = _worst_explained_first(labels, chains)
+    for k in cycle(order):
+        rest, before = _taken_out(k, labels, chains, graph)
+        renewed, after = _aligned(k, labels, chains, rest)
+        idle += 1
+        if after - before > LEAST_GAIN:
+            labels, idle = _compact(renewed), 0
+            graph = graph_of(labels, chains)
+        if idle == len(order):
+            return labels
 
 
-def rebuild(labels, chains, prior):
-    """Take every demonstration out, and align them again one after another, the best explained
-    first.
-    """
-    table = emission_table(prior, len(labels) + 1)
-    order = worst_explained_first(labels, chains, graph_of(labels, chains), prior, table)[::-1]
+def _rebuild(labels, chains):
+    """Take every demonstration out, and align them again in turn, the best explained first."""
     rebuilt = np.full(len(labels), START)
-    for k in order:
-        part, graph = chains.slices[k], graph_of(rebuilt, chains)
-        place = mean_place(rebuilt, chains, len(graph.n))
-        aligned, _ = align_chain(chains.points[part], place, graph, prior, table)
-        rebuilt[part] = np.where(aligned < 0, len(graph.n) + np.arange(len(aligned)), aligned)
-    return compact(rebuilt)
+    for k in _worst_explained_first(labels, chains)[::-1]:
+        rebuilt, _ = _aligned(k, rebuilt, chains, graph_of(rebuilt, chains))
+    return _compact(rebuilt)
 
 
-def improve(labels, chains, prior):
-    """Labels (M,) that neither aligning one demonstration afresh nor merging two states can
-    improve.
-    """
+def _improve(labels, chains):
+    """Labels that neither aligning one demonstration afresh nor merging two states can improve."""
     improved = None
     while not np.array_equal(labels, improved):
-        improved = compact(realign(compact(labels), chains, prior))
-        labels = merge_states(improved, chains, prior)
+        improved = _realign(_compact(labels), chains)
+        labels = merge_states(improved, chains)
     return improved
 
 
-def estimate_structure(chains, prior):
-    """Labels (M,) by best-first merging, built anew from what that has taught as often as it helps,
-    and improved.
+def estimate_structure(chains):
+    """Best-first merging, built anew from what it has taught as often as that helps (Sec. V).
+
+    The moves beyond merging are a reconstruction.
+
+    Parameters
+    ----------
+    chains : record
+        Of M subgoals.
+
+    Returns
+    -------
+    (M,) int array
+        Labels, numbered without gaps.
     """
-    labels = compact(merge_states(np.arange(len(chains.points)) + FIRST, chains, prior))
+    labels = _compact(merge_states(np.arange(len(chains.points)) + FIRST, chains))
     while True:
-        rebuilt = improve(rebuild(labels, chains, prior), chains, prior)
-        gain = evidence_of(rebuilt, chains, prior) - evidence_of(labels, chains, prior)
+        rebuilt = _improve(_rebuild(labels, chains), chains)
+        gain = evidence_of(rebuilt, chains) - evidence_of(labels, chains)
         if gain <= LEAST_GAIN:
-            return rebuilt if gain > -LEAST_GAIN else improve(labels, chains, prior)
+            return rebuilt if gain > -LEAST_GAIN else _improve(labels, chains)
         labels = rebuilt
 
 
 def set_apart(labels, chains):
-    """Give demonstrations that do something else states of their own, so that they draw nobody's
-    subgoals aside.
+    """Give demonstrations that do something else states of their own (beyond the paper).
 
-    They may share those with each other. Taking them out can change the most-likely path, hence the
-    repetition.
+    So they draw nobody's subgoals aside. They may share states with each other. Taking them out can
+    change the most-likely path, hence the repetition.
+
+    Parameters
+    ----------
+    labels, chains : (M,) int array and record
+
+    Returns
+    -------
+    (M,) int array
+        Labels.
     """
-    owner = np.repeat(np.arange(len(chains.slices)), [part.stop - part.start for part in chains.slices])
     apart = np.zeros(len(chains.slices), bool)
     while True:
-        chain_of = [labels[part] for part in chains.slices]
-        path = path_through(graph_of(labels, chains), earliest(labels, chains))
-        strangers = apart | (coverage_of(chain_of, path) < LEAST_COVERAGE)
+        path = path_through(labels, chains)
+        coverage = coverage_of([labels[part] for part in chains.slices], path)
+        strangers = apart | (coverage < LEAST_COVERAGE)
         if np.array_equal(strangers, apart):
             return labels
         apart = strangers
-        labels = compact(labels + apart[owner] * labels.max())
+        labels = _compact(labels + apart[chains.owner] * labels.max())
 
 
-def coverage_of(chains, path):
-    """The share of the states of a path that each chain of states visits: (number of chains,)."""
-    return np.array([np.isin(path, chain).mean() for chain in chains])
+def coverage_of(states, path):
+    """The share of the states of a path that each demonstration visits (beyond the paper).
+
+    Parameters
+    ----------
+    states : sequence of (K,) int arrays
+        Those of D demonstrations.
+    path : (L,) int array
+
+    Returns
+    -------
+    (D,) float array
+        Between 0 and 1.
+    """
+    return np.array([np.isin(path, visited).mean() for visited in states])
 
 
 def numbered(labels, chains):
-    """Labels numbered so that every edge leads from a lower to a higher state; where that leaves it
-    open, by place.
+    """Labels numbered so that every edge leads from a lower to a higher state (Sec. V).
+
+    Where that leaves the order open, it is by the mean place in the demonstrations.
+
+    Parameters
+    ----------
+    labels, chains : (M,) int array and record
+        Numbered without gaps.
+
+    Returns
+    -------
+    (M,) int array
+        Labels.
     """
-    order = topological_order(graph_of(labels, chains).counts, mean_place(labels, chains, labels.max() + 1))
-    states = [node for node in order if node >= FIRST]
-    rank = np.zeros(labels.max() + 1, int)
-    rank[states] = np.arange(len(states))
-    return rank[labels] + FIRST
+    counts = graph_of(labels, chains).counts
+    order = topological_order(counts, _mean_place(labels, chains, len(counts)))
+    return np.argsort(order)[labels] - 1 + FIRST  # the order begins with START and ends with END
 
 
-def earliest(labels, chains):
-    """The first demonstration that visits each node: (number of nodes,) for labels (M,)."""
-    first = np.full(labels.max() + 1, len(chains.slices))
-    for k, part in reversed(list(enumerate(chains.slices))):
-        first[labels[part]] = k
-    return first
-
-
-def path_through(graph, first):
-    """The nodes between START and END on the most probable way through.
+def path_through(labels, chains):
+    """The nodes between START and END on the most probable way through the graph (Sec. V).
 
     Probabilities are multiplied as exact fractions, so that a tie is a tie. (What the states emit
     stays out: a density has units, and would reward or punish long paths by the choice of metres.)
     Ties go to the way of fewer states, then to that with more subgoals in them, then to that of the
-    demonstration given earlier, `first` (S,) per node.
+    demonstration given earlier.
+
+    Parameters
+    ----------
+    labels, chains : (M,) int array and record
+        Numbered without gaps.
+
+    Returns
+    -------
+    (L,) int array
+        In order.
     """
-    totals, reach = graph.counts.sum(1), {START: (Fraction(1), 0, 0, 0)}
-    came = {}
-    for node in topological_order(graph.counts, np.zeros(len(totals))):
-        if node not in reach:
-            continue
-        probability, length, visits, lateness = reach[node]
-        for successor in np.flatnonzero(graph.counts[node]).tolist():
-            share = Fraction(int(graph.counts[node, successor]), int(totals[node]))
-            late = 0 if successor == END else int(first[successor])
-            value = (probability * share, length - 1, visits + int(graph.n[successor]), lateness - late)
-            if successor not in reach or value > reach[successor]:
-                reach[successor], came[successor] = value, node
+    graph = graph_of(labels, chains)
+    totals, n = graph.counts.sum(1).tolist(), graph.n.tolist()
+    first = np.full(len(n), len(chains.slices))
+    np.minimum.at(first, labels, chains.owner)
+    late = np.append([0, 0], first[FIRST:]).tolist()
+    reach, came = {START: (Fraction(1), 0, 0, 0)}, {}
+    for node in topological_order(graph.counts, np.zeros(len(n))):
+        probability, length, visits, earliness = reach[node]
+        for after in np.flatnonzero(graph.counts[node]).tolist():
+            share = Fraction(int(graph.counts[node, after]), totals[node])
+            value = probability * share, length - 1, visits + n[after], earliness - late[after]
+            if after not in reach or value > reach[after]:
+                reach[after], came[after] = value, node
     path = [came[END]]
     while path[-1] != START:
         path.append(came[path[-1]])

@@ -1,5 +1,4 @@
-"""Sec. V: a Continuous-Density Hidden Markov Model (CDHMM) of the user, its structure estimated
-from subgoals.
+"""A Continuous-Density Hidden Markov Model (CDHMM) of the user, estimated from subgoals (Sec. V).
 
 The user is a CDHMM that emits subgoals. Every demonstration enters as a chain of states of its own,
 START -> .. -> END; states are merged best-first while the evidence of the whole grows, never when
@@ -11,9 +10,7 @@ search.
 """
 
 from dataclasses import dataclass
-from functools import reduce
 from itertools import pairwise
-from operator import add
 
 import numpy as np
 import scipy
@@ -22,25 +19,13 @@ from dollop.cdhmm.alignment import (
     LEAST_COVERAGE,
     align_chain,
     coverage_of,
-    earliest,
     estimate_structure,
-    mean_place,
     numbered,
     path_through,
     set_apart,
 )
-from dollop.cdhmm.evidence import (
-    END,
-    FIRST,
-    START,
-    chains_of,
-    emission_table,
-    evidence_of,
-    graph_of,
-    outer_products,
-    prior_over,
-)
-from dollop.checks import check_positive, checked_positions
+from dollop.cdhmm.evidence import END, FIRST, START, chains_of, evidence_of, graph_of, outer_products
+from dollop.checks import checked_positions
 
 __all__ = ["SubgoalHMM"]
 
@@ -49,10 +34,10 @@ LEAST_SPREAD, MOST_SPREAD = 1e-6, 1e6  # m: beyond, the evidence drowns in round
 
 @dataclass(frozen=True, eq=False)
 class SubgoalHMM:
-    """What several demonstrations have in common: a CDHMM over subgoals, acyclic, its structure
-    estimated (Sec. V).
+    """What several demonstrations have in common: an acyclic CDHMM over subgoals (Sec. V).
 
-    States are numbered so that every edge leads from a lower to a higher one.
+    Its structure is estimated. States are numbered so that every edge leads from a
+    lower to a higher one.
 
     Attributes
     ----------
@@ -103,7 +88,7 @@ class SubgoalHMM:
 
     @classmethod
     def fit(cls, sequences, spread=0.15):
-        """Estimate structure and parameters from the subgoals of each demonstration.
+        """Estimate structure and parameters from the subgoals of each demonstration (Sec. V).
 
         Parameters
         ----------
@@ -125,58 +110,79 @@ class SubgoalHMM:
             No demonstration, one that is empty, not (K, 2) or not finite, or a spread that is not
             positive.
         """
-        sequences = tuple(checked_sequence(sequence, f"demonstration {k}") for k, sequence in enumerate(sequences))
+        sequences = tuple(checked_sequence(s, f"demonstration {k}") for k, s in enumerate(sequences))
         if not sequences:
             raise ValueError("sequences must hold at least one demonstration, got none")
-        check_positive("spread", spread)
         if not LEAST_SPREAD <= spread <= MOST_SPREAD:
-            raise ValueError(f"spread must lie between {LEAST_SPREAD:g} and {MOST_SPREAD:g} m, got {spread}")
-        chains = chains_of(sequences)
-        prior = prior_over(chains.points, spread)
-        labels = numbered(set_apart(estimate_structure(chains, prior), chains), chains)
-        return cls._of(labels, chains, prior, sequences, spread)
+            limits = f"between {LEAST_SPREAD:g} and {MOST_SPREAD:g} m"
+            raise ValueError(f"spread must lie {limits}, got {spread}")
+        chains = chains_of(sequences, spread)
+        labels = numbered(set_apart(estimate_structure(chains), chains), chains)
+        return cls._of(labels, chains, sequences, spread)
 
     @classmethod
-    def _of(cls, labels, chains, prior, sequences, spread):
+    def _of(cls, labels, chains, sequences, spread):
         graph = graph_of(labels, chains)
-        probability = graph.counts[:, FIRST:] / np.maximum(graph.counts.sum(1), 1)[:, None]
-        means, covariances = parameters_of(graph, prior)
+        probability = graph.counts / np.maximum(graph.counts.sum(1), 1)[:, None]
+        means, covariances = parameters_of(graph, chains.prior)
         return cls(
-            means=means + np.mean(np.concatenate(sequences), axis=0),
+            means=means + chains.centre,
             covariances=covariances,
-            transitions=probability[FIRST:],
-            start=probability[START],
-            end=graph.counts[FIRST:, END] / graph.counts[FIRST:].sum(1),
+            transitions=probability[FIRST:, FIRST:],
+            start=probability[START, FIRST:],
+            end=probability[FIRST:, END],
             sequences=sequences,
             states=tuple(labels[part] - FIRST for part in chains.slices),
             spread=float(spread),
-            evidence=evidence_of(labels, chains, prior),
+            evidence=evidence_of(labels, chains),
         )
 
     def add(self, sequence):
-        """The model of all demonstrations so far and one more, (K, 2) in m: the same as fitting all
-        of them at once.
+        """The model of all demonstrations so far and one more: as fitting all at once (Sec. V).
+
+        Parameters
+        ----------
+        sequence : (K, 2) array_like
+            The subgoals of the new demonstration in m, in the same environment.
+
+        Returns
+        -------
+        SubgoalHMM
+
+        Raises
+        ------
+        ValueError
+            A sequence that is empty, not (K, 2) or not finite.
         """
         return SubgoalHMM.fit([*self.sequences, sequence], self.spread)
 
     def most_likely_path(self):
-        """States of the most probable way from start to end, in order (L,): the task (Sec. V).
+        """States of the most probable way from start to end: the task (Sec. V).
 
         Among equally probable ways the one of fewer states, then the one whose states hold more
         subgoals, then the one that was demonstrated earlier.
+
+        Returns
+        -------
+        (L,) int array
+            In order, so that they grow.
         """
-        chains, graph, _ = self._grown()
-        return path_through(graph, earliest(np.concatenate(self.states) + FIRST, chains)) - FIRST
+        return path_through(*self._grown()) - FIRST
 
     def coverage(self):
-        """The share of the states on the most-likely path that each demonstration visits,
-        (demonstrations,).
+        """The share of the most-likely path that each demonstration visits (beyond the paper).
+
+        Returns
+        -------
+        (D,) float array
+            Of D demonstrations, between 0 and 1.
         """
         return coverage_of(self.states, self.most_likely_path())
 
     def outliers(self):
-        """Demonstrations that do something else: they visit fewer than half of the states of the
-        most-likely path.
+        """Demonstrations that do something else: they visit less than half of the most-likely path.
+
+        Beyond the paper, which takes it that all demonstrations are of one task.
 
         Returns
         -------
@@ -186,7 +192,7 @@ class SubgoalHMM:
         return tuple(np.flatnonzero(self.coverage() < LEAST_COVERAGE).tolist())
 
     def segments(self):
-        """Which segments of which demonstrations run along each edge.
+        """Which segments of which demonstrations run along each edge (Sec. V).
 
         Returns
         -------
@@ -201,8 +207,7 @@ class SubgoalHMM:
         return edges
 
     def pooled(self, statistics):
-        """Add up along each edge what segments have in common, so that one LDS describes all that
-        were merged (Sec. V).
+        """Add up what the segments along each edge have: one LDS describes all of them (Sec. V).
 
         Parameters
         ----------
@@ -223,15 +228,18 @@ class SubgoalHMM:
         """
         given, held = [len(each) for each in statistics], [len(each) for each in self.sequences]
         if given != held:
-            raise ValueError(f"statistics must have one entry per segment, {held} by demonstration, got {given}")
-        return {
-            edge: reduce(add, (statistics[demonstration][segment] for demonstration, segment in members))
-            for edge, members in self.segments().items()
-        }
+            rule = f"one entry per segment, {held} by demonstration"
+            raise ValueError(f"statistics must have {rule}, got {given}")
+        sums = {}
+        for edge, members in self.segments().items():
+            first, *others = [statistics[d][i] for d, i in members]
+            sums[edge] = sum(others, first)
+        return sums
 
     def states_of(self, sequence):
-        """The states of another demonstration's subgoals, those that raise the evidence most
-        (Viterbi).
+        """The states of another demonstration's subgoals: those that raise the evidence most.
+
+        Found by dynamic programming, as Viterbi's (reconstruction).
 
         Parameters
         ----------
@@ -251,16 +259,14 @@ class SubgoalHMM:
             A sequence that is empty, not (K, 2) or not finite.
         """
         sequence = checked_sequence(sequence, "sequence")
-        chains, graph, place = self._grown()
-        prior = prior_over(chains.points, self.spread)
-        table = emission_table(prior, len(chains.points) + 1)
-        centre = np.mean(np.concatenate(self.sequences), axis=0)
-        nodes, _ = align_chain(sequence - centre, place, graph, prior, table)
+        labels, chains = self._grown()
+        nodes, _ = align_chain(sequence - chains.centre, graph_of(labels, chains), labels, chains)
         return np.where(nodes < 0, -1, nodes - FIRST)
 
     def log_likelihood(self, sequence):
-        """Logarithm of the probability density that the model emits these subgoals, summed over all
-        its paths.
+        """How probable it is that the model emits these subgoals, over all its paths (Sec. V).
+
+        The logarithm of a density, by the forward recursion of hidden Markov models.
 
         Parameters
         ----------
@@ -286,15 +292,12 @@ class SubgoalHMM:
         return float(scipy.special.logsumexp(forward + end))
 
     def _grown(self):
-        """The chains again, the graph of their states, and the mean place of its nodes."""
-        chains, labels = chains_of(self.sequences), np.concatenate(self.states) + FIRST
-        return chains, graph_of(labels, chains), mean_place(labels, chains, labels.max() + 1)
+        """The labels of all subgoals, and the chains, from which the graph is made again."""
+        return np.concatenate(self.states) + FIRST, chains_of(self.sequences, self.spread)
 
 
 def parameters_of(graph, prior):
-    """Mean of the subgoals of each state (S, 2), and the posterior mean of its covariance (S, 2,
-    2).
-    """
+    """Mean of each state's subgoals (S, 2), posterior mean of its covariance (S, 2, 2)."""
     n, s, q = graph.n[FIRST:, None], graph.s[FIRST:], graph.q[FIRST:]
     scatter = q - outer_products(s) / (prior.kappa + n) + prior.psi * np.array([1, 0, 1])
     covariances = scatter / (prior.nu + n - 3)
@@ -309,7 +312,7 @@ def log_normal(points, means, covariances):
 
 
 def checked_sequence(sequence, name):
-    """Subgoals as a float array (K, 2), in m; ValueError that calls them `name` if they are none."""
+    """Subgoals as a float array (K, 2) in m; ValueError that calls them `name` if they are none."""
     sequence = checked_positions(name, sequence)
     if not len(sequence):
         raise ValueError(f"{name} must hold at least one subgoal, as (K, 2), got none")

@@ -6,28 +6,30 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_t
 
-from dollop.cdhmm.alignment import align_chain, compact, estimate_structure, mean_place, path_through
+from dollop.cdhmm.alignment import (
+    _compact,
+    _mean_place,
+    align_chain,
+    estimate_structure,
+    path_through,
+)
 from dollop.cdhmm.evidence import (
     END,
     FIRST,
     START,
-    Graph,
-    Prior,
+    _Prior,
     chains_of,
     emission_evidence,
-    emission_table,
     evidence_of,
     graph_of,
     outer_products,
-    prior_over,
     transition_evidence,
 )
 from dollop.cdhmm.merging import Merging, merge_states, reachability, topological_order
 
 
 def prepared(sequences, spread=0.15):
-    chains = chains_of([np.asarray(sequence, float) for sequence in sequences])
-    return chains, prior_over(chains.points, spread)
+    return chains_of([np.asarray(sequence, float) for sequence in sequences], spread)
 
 
 def any_sequences(seed, n, most=5):
@@ -43,18 +45,20 @@ def any_sequences(seed, n, most=5):
 
 def test_chains_and_prior_are_what_they_say():
     """Places divide a demonstration evenly; the prior expects states of that spread, as wide apart as the subgoals."""
-    chains, prior = prepared([[(0, 0), (2, 0), (4, 0)], [(0, 0)]], spread=0.5)
+    sequences = [np.array([(0, 0), (2, 0), (4, 0)]), np.array([(0, 0)])]
+    chains = prepared(sequences, spread=0.5)
     np.testing.assert_allclose(chains.place, [1 / 4, 2 / 4, 3 / 4, 1 / 2])
     np.testing.assert_allclose(chains.points[:, 0], [-1.5, 0.5, 2.5, -1.5])
-    assert chains.first.tolist() == [True, False, False, True] and chains.slices == (slice(0, 3), slice(3, 4))
-    assert prior == Prior(kappa=pytest.approx(0.5**2 / (11 / 8)), nu=8.0, psi=pytest.approx(5 * 0.5**2))
-    assert prior_over(chains.points / 1000, 0.5).kappa == 1
+    assert chains.owner.tolist() == [0, 0, 0, 1] and chains.slices == (slice(0, 3), slice(3, 4))
+    kappa, psi = pytest.approx(0.5**2 / (11 / 8)), pytest.approx(5 * 0.5**2)
+    assert chains.prior == _Prior(kappa=kappa, nu=8.0, psi=psi, most=8)
+    assert prepared([each / 1000 for each in sequences], 0.5).prior.kappa == 1
 
 
 def test_emission_evidence_is_the_product_of_predictions():
     """The closed form equals predicting subgoal after subgoal by Student's t, each from those before it."""
     points = np.random.default_rng(0).normal(0, 0.3, (6, 2))
-    prior = Prior(kappa=0.04, nu=8.0, psi=0.1)
+    prior = _Prior(kappa=0.04, nu=8.0, psi=0.1, most=len(points))
     expected = 0.0
     for n, point in enumerate(points):
         seen = points[:n]
@@ -62,8 +66,7 @@ def test_emission_evidence_is_the_product_of_predictions():
         scale = prior.psi * np.eye(2) + seen.T @ seen - kappa * np.outer(centre, centre)
         shape = scale * (kappa + 1) / (kappa * (nu - 1))
         expected += multivariate_t(centre, shape, df=nu - 1).logpdf(point)
-    table = emission_table(prior, len(points))
-    evidence = emission_evidence(len(points), points.sum(0), outer_products(points).sum(0), prior, table)
+    evidence = emission_evidence(len(points), points.sum(0), outer_products(points).sum(0), prior)
     assert evidence == pytest.approx(expected)
 
 
@@ -94,14 +97,14 @@ def test_reachability_is_the_transitive_closure(seed):
 @pytest.mark.parametrize("seed", range(8))
 def test_gains_kept_up_to_date_are_the_gains_of_evidence(seed):
     """After every merge the gain of each pair equals the evidence computed anew with that pair merged."""
-    chains, prior = prepared(any_sequences(seed, 4))
-    merging = Merging(np.arange(len(chains.points)) + FIRST, chains, prior)
+    chains = prepared(any_sequences(seed, 4))
+    merging = Merging(np.arange(len(chains.points)) + FIRST, chains)
     gain = np.inf
     while gain > 0:
-        before = evidence_of(merging.labels, chains, prior)
+        before = evidence_of(merging.labels, chains)
         for a, b in np.argwhere(~merging.blocked):
             merged = np.where(merging.labels == merging.names[b], merging.names[a], merging.labels)
-            assert merging.gain[a, b] == pytest.approx(evidence_of(merged, chains, prior) - before, abs=1e-9)
+            assert merging.gain[a, b] == pytest.approx(evidence_of(merged, chains) - before, abs=1e-9)
         u, v, gain = merging.best()
         if gain > 0:
             merging.merge(u, v)
@@ -124,22 +127,22 @@ def alignments(length, nodes):
 def test_alignment_is_the_best_of_all(seed):
     """The alignment of one demonstration with the graph of others gains the most evidence of all that keep an order."""
     sequences = any_sequences(seed, 3, most=4)
-    chains, prior = prepared(sequences)
+    chains = prepared(sequences)
     rest = chains.slices[0].stop
-    labels = compact(merge_states(np.arange(len(chains.points)) + FIRST, chains, prior))
+    labels = _compact(merge_states(np.arange(len(chains.points)) + FIRST, chains))
     labels[:rest] = START
-    labels[rest:] = compact(labels[rest:])
+    labels[rest:] = _compact(labels[rest:])
     graph = graph_of(labels, chains)
-    place = mean_place(labels, chains, len(graph.n))
-    table = emission_table(prior, len(labels))
-    aligned, gain = align_chain(chains.points[:rest], place, graph, prior, table)
+    place = _mean_place(labels, chains, len(graph.n))
+    aligned, gain = align_chain(chains.points[:rest], graph, labels, chains)
     order = [node for node in topological_order(graph.counts, place) if node >= FIRST]
 
     def evidence(chain):
         own = len(graph.n) + np.arange(rest)
-        return evidence_of(np.concatenate([np.where(chain < 0, own, chain), labels[rest:]]), chains, prior)
+        return evidence_of(np.concatenate([np.where(chain < 0, own, chain), labels[rest:]]), chains)
 
-    without = emission_evidence(graph.n, graph.s, graph.q, prior, table).sum() + transition_evidence(graph.counts).sum()
+    emissions = emission_evidence(graph.n, graph.s, graph.q, chains.prior)
+    without = emissions.sum() + transition_evidence(graph.counts).sum()
     best = max(evidence(chain) for chain in alignments(rest, order))
     assert evidence(aligned) == pytest.approx(best)
     assert gain == pytest.approx(best - without)
@@ -164,10 +167,10 @@ def test_structure_has_nearly_always_the_highest_evidence_of_all():
         random = np.random.default_rng(seed)
         task = random.uniform(-0.5, 0.5, (3, 2))
         sequences = [task[rows] + random.normal(0, 0.15, (len(rows), 2)) for rows in ([0, 1, 2], [0, 2], [0, 1])]
-        chains, prior = prepared(sequences)
+        chains = prepared(sequences)
         graphs = [(labels + FIRST, graph_of(labels + FIRST, chains).counts) for labels in every]
-        best = max(evidence_of(labels, chains, prior) for labels, counts in graphs if is_acyclic(counts))
-        hits += evidence_of(estimate_structure(chains, prior), chains, prior) >= best - 1e-9
+        best = max(evidence_of(labels, chains) for labels, counts in graphs if is_acyclic(counts))
+        hits += evidence_of(estimate_structure(chains), chains) >= best - 1e-9
     assert hits >= 24
 
 
@@ -186,17 +189,18 @@ def all_paths(counts, node=START):
 def test_most_likely_path_is_the_best_of_all(seed):
     """On random acyclic graphs no path is more probable, nor as probable with fewer states or with more subgoals."""
     random = np.random.default_rng(seed)
-    chains = [[START, *np.flatnonzero(random.random(6) < 0.5) + FIRST, END] for _ in range(5)]
-    chains = [chain for chain in chains if len(chain) > 2]
-    counts, n = np.zeros((8, 8), int), np.zeros(8, int)
-    for chain in chains:
-        n[chain[1:-1]] += 1
-        for u, v in pairwise(chain):
+    visited = [np.flatnonzero(random.random(6) < 0.5) for _ in range(5)]
+    visited = [states for states in visited if len(states)]
+    labels = _compact(np.concatenate(visited))
+    chains = prepared([np.zeros((len(states), 2)) for states in visited])
+    counts, n = np.zeros((8, 8), int), np.bincount(labels, minlength=8)
+    for part in chains.slices:
+        for u, v in pairwise([START, *labels[part], END]):
             counts[u, v] += 1
 
     def merit(path):
         shares = [counts[u, v] / counts[u].sum() for u, v in pairwise(path)]
         return round(float(np.prod(shares)), 12), -len(path), n[list(path)].sum()
 
-    path = (START, *path_through(Graph(n, None, None, counts), np.zeros(len(n), int)).tolist(), END)
+    path = (START, *path_through(labels, chains).tolist(), END)
     assert merit(path) == max(merit(each) for each in all_paths(counts))

@@ -288,7 +288,7 @@ def test_bad_demonstrations_are_named(sequences, message):
 @pytest.mark.parametrize("spread", [0, -0.1, np.nan, np.inf])
 def test_a_spread_must_be_positive(spread):
     """A spread of zero or less, or none at all, is refused."""
-    with pytest.raises(ValueError, match="spread must be positive and finite, got"):
+    with pytest.raises(ValueError, match=f"spread must lie between 1e-06 and .* m, got {spread}"):
         SubgoalHMM.fit([SLALOM], spread)
 
 
