@@ -100,9 +100,9 @@ def gather():
 
 
 def adopt(path):
-    """Copy a file that a page links to, unless it is there already or is no file of the project."""
-    original = ROOT / path.relative_to(SOURCE)
-    if original.is_file() and not path.exists():
+    """Copy a file of the project that a page links to, unless it is there already."""
+    original = ROOT / os.path.relpath(path, SOURCE)
+    if path.is_relative_to(SOURCE) and original.is_file() and not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(original, path)
 
@@ -123,13 +123,13 @@ def write_api(folder):
     sentences = modules()
     for name in sentences:
         source = f".. automodule:: {name}\n   :members:\n"
-        (folder / f"{name}.rst").write_text(heading(name, "=") + source)
+        (folder / f"{name}.rst").write_text(heading(name, "=") + source, encoding="utf-8")
     parts = [heading("API", "="), ".. automodule:: dollop\n\n", heading("The public names", "-")]
     parts.append(table({link_in_rst(name): first_line(name) for name in PUBLIC}))
     for wing, title in WINGS.items():
         inside = sorted((name for name in sentences if belongs(name) == wing), key=place)
         parts += [heading(title, "-"), *contents(inside, sentences)]
-    (folder / "index.rst").write_text("".join(parts))
+    (folder / "index.rst").write_text("".join(parts), encoding="utf-8")
 
 
 def contents(names, sentences):

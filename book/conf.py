@@ -10,6 +10,7 @@ from importlib.util import find_spec
 
 from docutils.nodes import SkipNode
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.util.logging import getLogger
 from sphinx.util.nodes import make_refnode
 
 project = "Dollop"
@@ -49,6 +50,7 @@ html_theme_options = {
 }
 html_math_renderer = "mathml"
 
+LOG = getLogger(__name__)
 SHORT = {"function", "class", "exception", "data"}
 MEMBERS = {"method", "classmethod", "staticmethod", "property", "attribute"}
 
@@ -83,7 +85,7 @@ def formulas_as_they_stand(app, what, name, thing, options, lines):
 
 
 def told_elsewhere(app, what, name, thing, skip, options):
-    """Leave out what a package only hands on, and a NamedTuple's fields: both have their entry."""
+    """Leave out what a package only hands on, and the fields of a NamedTuple: all have entries."""
     if type(thing).__name__ == "_tuplegetter":
         return True
     if what != "module" or not hasattr(thing, "__qualname__"):
@@ -92,17 +94,29 @@ def told_elsewhere(app, what, name, thing, skip, options):
 
 
 def by_short_name(app, env, node, contnode):
-    """Link a short name (`observe`, `LDS.fit`) to its entry, if only one object is called so."""
+    """Link a short name (`observe`, `LDS.fit`) to its entry, if only one object is called so.
+
+    What begins with the package's name has an entry, or the build fails; `dollop.lab.Pioneer` has it
+    in the module that the wing's door leads to.
+    """
     if node.get("refdomain") != "py":
         return None
-    short = "." + node["reftarget"].removeprefix("dollop.")
-    kinds = SHORT if short.count(".") == 1 else SHORT | MEMBERS
-    objects = env.domains.python_domain.objects.items()
-    found = [(name, to) for name, to in objects if name.endswith(short) and to.objtype in kinds]
-    if len(found) != 1:
-        return None
-    name, to = found[0]
-    return make_refnode(app.builder, node["refdoc"], to.docname, to.node_id, contnode, name)
+    objects = env.domains.python_domain.objects
+    target = node["reftarget"].removeprefix("dollop.")
+    found = called(target, objects) or called(target.split(".")[-1], objects)
+    if len(found) == 1:
+        to = objects[found[0]]
+        return make_refnode(app.builder, node["refdoc"], to.docname, to.node_id, contnode, found[0])
+    if node["reftarget"].startswith("dollop."):
+        LOG.warning("no entry for %s", node["reftarget"], location=node)
+    return None
+
+
+def called(short, objects):
+    """Full names of the objects that are called so; what belongs to a class only with its class."""
+    kinds = SHORT | MEMBERS if "." in short else SHORT
+    names = [name for name, to in objects.items() if to.objtype in kinds]
+    return [name for name in names if name.endswith(f".{short}")]
 
 
 def setup(app):

@@ -81,7 +81,7 @@ def test_a_public_name_becomes_a_link_and_other_code_stays():
 def test_the_api_has_a_page_for_every_module_and_a_row_for_every_public_name(tmp_path):
     """Modules stand in the order of the paper, each with its first sentence."""
     build.write_api(tmp_path / "api")
-    first = (tmp_path / "api" / "index.rst").read_text()
+    first = (tmp_path / "api" / "index.rst").read_text(encoding="utf-8")
     assert all(f"`dollop.{name} <" in first for name in build.PUBLIC)
     assert {path.stem for path in (tmp_path / "api").iterdir()} == {"index", *build.modules()}
     rows = re.findall(r"- :doc:`(\S+)`\n +- (.+)", first)
