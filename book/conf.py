@@ -96,8 +96,8 @@ def told_elsewhere(app, what, name, thing, skip, options):
 def by_short_name(app, env, node, contnode):
     """Link a short name (`observe`, `LDS.fit`) to its entry, if only one object is called so.
 
-    What begins with the package's name has an entry, or the build fails; `dollop.lab.Pioneer` has it
-    in the module that the wing's door leads to.
+    What begins with the package's name has an entry, or the build fails; `dollop.lab.Pioneer` has
+    it in the module that the wing's door leads to.
     """
     if node.get("refdomain") != "py":
         return None
