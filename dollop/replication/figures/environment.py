@@ -13,6 +13,8 @@ from dollop.replication.figures.controls import COLUMNS, CONTROLS, at_once, by_k
 from dollop.replication.figures.panel import panel
 from dollop.replication.layouts import matching_shares
 
+__all__ = []
+
 NEAR = 0.11  # m, how far a label stands off its corner in the drawing
 ASIDE = 1.0, -2.2  # m, by which Fig. 8 draws the boxes of now aside, so that lines lie apart
 WIDE = 10  # inches, figures of three panels

@@ -11,6 +11,8 @@ from dollop.replication.figures.controls import COLUMNS, CONTROLS, by_kind, draw
 from dollop.replication.figures.panel import panel
 from dollop.replication.figures.performing import law_numbers
 
+__all__ = []
+
 SIZE = (6, 5.2)
 SPREAD = 0.15  # m, standard deviation of a subgoal in figure x2
 NUMBERS, FEW = (1, 2, 3, 4, 5, 7, 10), (2, 5, 10)  # of demonstrations

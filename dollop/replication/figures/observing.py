@@ -12,6 +12,8 @@ from dollop.observation import STATIC_EVERY, foreground_hits, static_boxes
 from dollop.replication import recordings
 from dollop.replication.figures.panel import panel
 
+__all__ = []
+
 GAIN, STATIC_GAIN = 0.6, 0.1  # defaults of `dollop.observe`
 
 
