@@ -5,7 +5,4 @@ from dollop.robot.control import PIONEER_LIMITS, Guidance, Limits
 from dollop.robot.localization import MonteCarloLocalizer
 from dollop.robot.performing import Run, Unicycle, perform
 
-__all__ = [
-    "PIONEER_LIMITS", "Guidance", "Limits", "MonteCarloLocalizer", "ObstacleMap", "Run", "Unicycle",
-    "perform",
-]  # fmt: skip
+__all__ = ["PIONEER_LIMITS", "Guidance", "Limits", "MonteCarloLocalizer", "ObstacleMap", "Run", "Unicycle", "perform"]

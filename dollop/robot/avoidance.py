@@ -14,7 +14,7 @@ this comes to a halt; the way out is then a `Geodesic`. The paper's robot knows 
 of this is Dollop's own.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from math import cos, hypot, inf, sin, sqrt
 
@@ -23,7 +23,7 @@ import scipy
 
 from dollop.gridmap import covered_cells, in_cells, in_metres
 
-__all__ = ["FREE_BELOW", "Geodesic", "ObstacleMap"]
+__all__ = ["FREE_BELOW", "Geodesic", "ObstacleMap", "towards"]
 
 ROBOT_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
@@ -73,10 +73,11 @@ class ObstacleMap:
     origin: tuple
     resolution: float
     radius: float = ROBOT_RADIUS
-    _lookup: list = field(init=False, repr=False)
 
-    def __post_init__(self):
-        object.__setattr__(self, "_lookup", self.distances.ravel().tolist())  # lists answer single questions faster
+    @cached_property
+    def _lookup(self):
+        """The distances as one list, which answers single questions faster than an array."""
+        return self.distances.ravel().tolist()
 
     @classmethod
     def of(cls, environment, background=None, places=(), radius=ROBOT_RADIUS, resolution=0.05):
@@ -142,10 +143,12 @@ class ObstacleMap:
         column, row = int(across), int(up)
         right, top = across - column, up - row
         corner, lookup = row * columns + column, self._lookup
-        a, b, c, d = lookup[corner], lookup[corner + 1], lookup[corner + columns], lookup[corner + columns + 1]
+        a, b = lookup[corner], lookup[corner + 1]
+        c, d = lookup[corner + columns], lookup[corner + columns + 1]
         lower, upper = a + right * (b - a), c + right * (d - c)
         slope_x = ((b - a) * (1 - top) + (d - c) * top) / self.resolution
-        return lower + top * (upper - lower) - self.radius, slope_x, (upper - lower) / self.resolution
+        slope_y = (upper - lower) / self.resolution
+        return lower + top * (upper - lower) - self.radius, slope_x, slope_y
 
     def cuts_corner(self, x, y, ahead_x, ahead_y):
         """Whether half-way to another place, straight on, the robot has next to no room.
@@ -185,7 +188,8 @@ class ObstacleMap:
         """
         across, up = in_cells(*np.asarray(positions).T, self.origin, self.resolution)
         at = np.stack([up, across]) - 0.5
-        return scipy.ndimage.map_coordinates(self.distances, at, order=1, mode="nearest") - self.radius
+        between = scipy.ndimage.map_coordinates(self.distances, at, order=1, mode="nearest")
+        return between - self.radius
 
     def holds(self, x, y):
         """Whether a place lies on the map.
@@ -219,11 +223,11 @@ class ObstacleMap:
             Unit vector; the law's own where nothing is near, or where it leads away from it.
         """
         edge, nx, ny = self._edge_and_slope(x, y)
-        towards = nx * ux + ny * uy
+        outwards = nx * ux + ny * uy
         length = nx * nx + ny * ny
-        if edge >= INFLUENCE or towards >= 0 or length < 1e-6:  # between two obstacles alike the slope is nought
+        if edge >= INFLUENCE or outwards >= 0 or length < 1e-6:  # no slope half-way between two
             return ux, uy
-        along = towards / length
+        along = outwards / length
         normal_x, normal_y = along * nx, along * ny
         share = (INFLUENCE - edge) / (INFLUENCE - KEPT)  # 1 / Gamma
         turned_x = (1 - share) * normal_x + (1 + share) * (ux - normal_x)
@@ -263,7 +267,8 @@ class ObstacleMap:
     @cached_property
     def _nearest_passable(self):
         """Flat index of the passable cell nearest to each cell, as a list."""
-        row, column = scipy.ndimage.distance_transform_edt(~self._passable, return_distances=False, return_indices=True)
+        nearest = {"return_distances": False, "return_indices": True}
+        row, column = scipy.ndimage.distance_transform_edt(~self._passable, **nearest)
         return (row * self.distances.shape[1] + column).ravel().tolist()
 
     @cached_property
@@ -273,17 +278,15 @@ class ObstacleMap:
         index = np.arange(rows * columns).reshape(rows, columns)
         room = np.clip((self.distances - self.radius) / INFLUENCE, 0.0, 1.0)
         cost = self.resolution * (1 + CROWDING * (1 - room))
-        heads, tails, costs = [], [], []
+        steps = []
         for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
             here = np.s_[: rows - down, max(-right, 0) : columns - max(right, 0)]
             there = np.s_[down:, max(right, 0) : columns + min(right, 0)]
             both = self._passable[here] & self._passable[there]
-            heads.append(index[here][both])
-            tails.append(index[there][both])
-            costs.append(hypot(down, right) * (cost[here] + cost[there])[both] / 2)
-        return scipy.sparse.coo_array(
-            (np.concatenate(costs), (np.concatenate(heads), np.concatenate(tails))), shape=(index.size, index.size)
-        ).tocsr()
+            costs = hypot(down, right) * (cost[here] + cost[there])[both] / 2
+            steps.append((costs, index[here][both], index[there][both]))
+        costs, heads, tails = map(np.concatenate, zip(*steps, strict=True))
+        return scipy.sparse.csr_array((costs, (heads, tails)), shape=(index.size, index.size))
 
     def _cell(self, x, y):
         """Flat index of the passable cell nearest to x, y in m."""
@@ -317,10 +320,10 @@ class Geodesic:
         self.obstacles = obstacles
         self._goal_cell = obstacles._cell(*goal)
         self.goal = obstacles._centre(self._goal_cell)
-        distances, before = scipy.sparse.csgraph.dijkstra(
-            obstacles._neighbours, directed=False, indices=self._goal_cell, return_predecessors=True
-        )
-        self._distances, self._before = distances.tolist(), before.tolist()
+        asked = {"directed": False, "indices": self._goal_cell, "return_predecessors": True}
+        found = scipy.sparse.csgraph.dijkstra(obstacles._neighbours, **asked)
+        self._distances, self._before = (each.tolist() for each in found)
+        self._before[self._goal_cell] = self._goal_cell
 
     def distance(self, x, y):
         """Length of the way from a place.
@@ -355,30 +358,44 @@ class Geodesic:
             return 0.0, 0.0
         edge, nx, ny = self.obstacles._edge_and_slope(x, y)
         if edge <= TIGHT:  # first to where there is room, and outwards
-            (ux, uy), (nx, ny) = toward(*self.obstacles._centre(cell), x, y), toward(nx, ny, 0.0, 0.0)
-            return toward(ux + nx, uy + ny, 0.0, 0.0)
-        cell = self._onward(cell)
+            ux, uy = towards(*self.obstacles._centre(cell), x, y)
+            nx, ny = towards(nx, ny)
+            return towards(ux + nx, uy + ny)
+        cell = self._before[cell]
         for _ in range(AHEAD - 1):
-            farther = self._onward(cell)
+            farther = self._before[cell]
             if self.obstacles.cuts_corner(x, y, *self.obstacles._centre(farther)):
                 break
             cell = farther
-        return toward(*self.obstacles._centre(cell), x, y)
-
-    def _onward(self, cell):
-        """The next cell on the way; the last one stays."""
-        return self._before[cell] if cell != self._goal_cell else cell
+        return towards(*self.obstacles._centre(cell), x, y)
 
 
-def toward(ahead_x, ahead_y, x, y):
-    """Unit vector from x, y to another place; zero where they are the same."""
-    size = hypot(ahead_x - x, ahead_y - y)
-    return ((ahead_x - x) / size, (ahead_y - y) / size) if size > 1e-9 else (0.0, 0.0)
+def towards(x, y, from_x=0.0, from_y=0.0):
+    """Unit vector that points to a place from another.
+
+    Parameters
+    ----------
+    x, y, from_x, from_y : float
+        Both places in m.
+
+    Returns
+    -------
+    (float, float)
+        Zero where they are the same.
+
+    Examples
+    --------
+    >>> towards(4.0, 6.0, 1.0, 2.0), towards(0.0, 0.0)
+    ((0.6, 0.8), (0.0, 0.0))
+    """
+    x, y = x - from_x, y - from_y
+    size = hypot(x, y)
+    return (x / size, y / size) if size > 1e-12 else (0.0, 0.0)
 
 
 def open_frame(boxes, places, resolution):
     """Lower left corner and shape of a map that holds boxes (N, 4) and places (M, 2) in m."""
-    points = np.concatenate([boxes[:, :2], boxes[:, 2:], np.reshape(places, (-1, 2))])
+    points = np.vstack([boxes.reshape(-1, 2), np.reshape(places, (-1, 2))])
     if not len(points):
         points = np.zeros((1, 2))
     low, high = points.min(axis=0) - OPEN_BORDER, points.max(axis=0) + OPEN_BORDER

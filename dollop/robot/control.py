@@ -17,14 +17,13 @@ user would have done from there. Two control laws make v and omega of it:
 The paper gives neither the rule of handing over nor a controller: both are reconstructions.
 """
 
-from math import atan2, cos, hypot, sin
-from typing import NamedTuple
+from collections import namedtuple
+from math import atan2, cos, dist, inf, sin
 
 import numpy as np
-import scipy
 
 from dollop.pose import wrapped
-from dollop.robot.avoidance import Geodesic
+from dollop.robot.avoidance import Geodesic, towards
 
 __all__ = ["CONTROL_LAWS", "PIONEER_LIMITS", "REACH", "Guidance", "Limits", "clip"]
 
@@ -34,14 +33,12 @@ would circle nearer ones."""
 PATIENCE = 8.0
 """Time in s without progress after which the way is changed or the speed halved; turning round
 takes half of it."""
-STEP = 0.05
-"""Distance in m between the places of a response that is pursued."""
-LOOK_AHEAD = 7
-"""How many places ahead the pursued one is: 0.35 m."""
-STRAY = 0.3
-"""Distance in m from its response at which it is rolled out anew from where the robot is."""
-JUMP = 0.3
-"""Distance in m in one control period that no robot drives: it has been kidnapped."""
+STEP, LOOK_AHEAD = 0.05, 7
+"""Distance in m between the places of a response that is pursued, and how many of them ahead the
+pursued one is: 0.35 m."""
+STRAY, JUMP = 0.3, 0.3
+"""Distances in m: from its response, at which it is rolled out anew from where the robot is; and in
+one control period, that no robot drives: it has been kidnapped."""
 FARTHEST = 100.0
 """Length in m after which a response that has not come to its subgoal is given up."""
 LEAST_SPEED = 0.1
@@ -57,7 +54,7 @@ SLOWEST = 1 / 16
 """Share of the demonstrated speed below which a robot that makes no progress gives up."""
 
 
-class Limits(NamedTuple):
+class Limits(namedtuple("Limits", "speed turn acceleration turn_acceleration")):
     """What a robot can do.
 
     Attributes
@@ -71,11 +68,6 @@ class Limits(NamedTuple):
     turn_acceleration : float
         In rad/s^2.
     """
-
-    speed: float
-    turn: float
-    acceleration: float
-    turn_acceleration: float
 
 
 PIONEER_LIMITS = Limits(0.5, 0.8, 0.5, 1.57)
@@ -135,9 +127,7 @@ class Guidance:
         self.obstacles = obstacles
         self.goals = [tuple(segment.goal.tolist()) for segment in law.segments]
         self._steps = [(segment.A - np.eye(2)).ravel().tolist() for segment in law.segments]
-        self._weights = [
-            scipy.linalg.solve_discrete_lyapunov(s.A.T, np.eye(2))[[0, 0, 1], [0, 1, 1]].tolist() for s in law.segments
-        ]
+        self._weights = [lyapunov_weights(segment.A) for segment in law.segments]
         self.detours, self._geodesics = {}, {}
 
     def direction(self, k, x, y):
@@ -155,25 +145,18 @@ class Guidance:
         (float, float)
             Unit vector; zero at the subgoal.
         """
-        if k in self.detours:
-            return self._detour_direction(k, x, y)
-        return self._round_obstacles(x, y, *self._response_direction(k, x, y))
-
-    def _response_direction(self, k, x, y):
-        """Unit vector of (A_k - I)(p - g_k) at p = (x, y)."""
         (gx, gy), (a, b, c, d) = self.goals[k], self._steps[k]
-        x, y = x - gx, y - gy
-        return unit(a * x + b * y, c * x + d * y)
+        offset_x, offset_y = x - gx, y - gy
+        wish = towards(a * offset_x + b * offset_y, c * offset_x + d * offset_y)
+        return self._led(k, x, y, *wish)
 
-    def _round_obstacles(self, x, y, ux, uy):
-        """The direction (ux, uy) at x, y in m, modulated if there are obstacles."""
-        return self.obstacles.modulate(x, y, ux, uy) if self.obstacles else (ux, uy)
-
-    def _detour_direction(self, k, x, y):
-        """Unit vector along the shortest way to subgoal k."""
+    def _led(self, k, x, y, ux, uy):
+        """The direction (ux, uy) of segment k at x, y in m, led round obstacles or by a detour."""
+        if k not in self.detours:
+            return self.obstacles.modulate(x, y, ux, uy) if self.obstacles else (ux, uy)
         if self.detours[k]:
             return self.detours[k].direction(x, y)
-        return unit(self.goals[k][0] - x, self.goals[k][1] - y)
+        return towards(*self.goals[k], x, y)
 
     def detour(self, k):
         """Leave the response of a segment for the shortest way to its subgoal (reconstruction).
@@ -227,13 +210,9 @@ class Guidance:
         -------
         bool
         """
-        gx, gy = self.goals[k]
-        if hypot(x - gx, y - gy) < reach:
-            return True
-        if not self.detours.get(k):
-            return False
-        gx, gy = self.detours[k].goal
-        return hypot(x - gx, y - gy) < reach
+        here, detour = (x, y), self.detours.get(k)
+        at_end = detour is not None and dist(detour.goal, here) < reach
+        return at_end or dist(self.goals[k], here) < reach
 
     def _leg(self, k, x, y):
         """Places 5 cm apart on the response of segment k from x, y in m, and whether it arrived."""
@@ -242,8 +221,8 @@ class Guidance:
             if self.reached(k, x, y, STEP):
                 return places, True
             ahead = self._state_ahead(k, ahead, x, y)
-            wish = unit(ahead[0] - x, ahead[1] - y)
-            ux, uy = self._detour_direction(k, x, y) if k in self.detours else self._round_obstacles(x, y, *wish)
+            wish = towards(*ahead, x, y)
+            ux, uy = self._led(k, x, y, *wish)
             x, y = x + STEP * ux, y + STEP * uy
             if (ux, uy) != wish:  # led elsewhere, the response goes on from there
                 ahead = x, y
@@ -255,11 +234,12 @@ class Guidance:
 
         It is the subgoal where the response comes that near to it before.
         """
-        (gx, gy), (a, b, c, d) = self.goals[k], self._steps[k]
-        while distance(state, x, y) < STEP <= distance(state, gx, gy):
-            offset_x, offset_y = state[0] - gx, state[1] - gy
-            state = state[0] + a * offset_x + b * offset_y, state[1] + c * offset_x + d * offset_y
-        return state if distance(state, x, y) >= STEP else (gx, gy)
+        here, goal, (a, b, c, d) = (x, y), self.goals[k], self._steps[k]
+        while dist(state, here) < STEP <= dist(state, goal):
+            offset_x, offset_y = state[0] - goal[0], state[1] - goal[1]
+            state_x = state[0] + a * offset_x + b * offset_y
+            state = state_x, state[1] + c * offset_x + d * offset_y
+        return state if dist(state, here) >= STEP else goal
 
     def way(self, k, x, y):
         """The responses of a segment and of all after it, rolled out one after the other.
@@ -298,7 +278,7 @@ class Guidance:
 
 def lyapunov_weights(A):
     """p, q, r of the P = [[p, q], [q, r]] that solves A^T P A - P = -I."""
-    return scipy.linalg.solve_discrete_lyapunov(A.T, np.eye(2))[[0, 0, 1], [0, 1, 1]].tolist()
+    return np.linalg.solve(np.eye(4) - np.kron(A.T, A.T), [1, 0, 0, 1])[[0, 1, 3]].tolist()
 
 
 class Supervisor:
@@ -335,12 +315,12 @@ class Supervisor:
 
     def restart(self):
         """Begin the segment in force: at its full pace, without a detour, and with new patience."""
-        self.pace, self.best, self.waited = 1.0, float("inf"), 0.0
+        self.pace, self.best, self.waited = 1.0, inf, 0.0
         self.guidance.detours.pop(self.active, None)
 
     def notice_kidnapping(self, x, y):
         """Begin the segment in force afresh where the robot finds itself elsewhere."""
-        if distance(self.last, x, y) > JUMP:
+        if dist(self.last, (x, y)) > JUMP:
             self.restart()
         self.last = x, y
 
@@ -354,7 +334,7 @@ class Supervisor:
 
     def insist(self):
         """Take a detour; where there is one already, halve the pace, and in the end give up."""
-        self.best, self.waited = float("inf"), 0.0
+        self.best, self.waited = inf, 0.0
         if self.guidance.obstacles and self.active not in self.guidance.detours:
             self.guidance.detour(self.active)
         else:
@@ -372,7 +352,8 @@ class Supervisor:
         """The speed in m/s, or less where it could not be braked in time."""
         if not self.guidance.obstacles:
             return speed
-        return min(speed, self.guidance.obstacles.speed_limit(x, y, theta, self.limits.acceleration, self.period))
+        braking = self.limits.acceleration, self.period
+        return min(speed, self.guidance.obstacles.speed_limit(x, y, theta, *braking))
 
 
 class Plain(Supervisor):
@@ -403,7 +384,7 @@ class Pursuit(Supervisor):
     "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-92-01).
     """
 
-    places = ((float("inf"), float("inf")),)  # no response yet: any pose is astray
+    places = ((inf, inf),)  # no response yet: any pose is astray
     at = 0
 
     def plan(self, x, y):
@@ -411,20 +392,21 @@ class Pursuit(Supervisor):
         self.places, self.segments = self.guidance.way(self.active, x, y)
         self.at, self.end = 0, len(self.places) - 1
         ux, uy = self.guidance.direction(len(self.speeds) - 1, *self.places[max(self.end - 1, 0)])
-        last_x, last_y = self.places[-1]
-        self.places += [(last_x + i * STEP * ux, last_y + i * STEP * uy) for i in range(1, LOOK_AHEAD + 1)]
+        end_x, end_y = self.places[-1]
+        on = range(1, LOOK_AHEAD + 1)
+        self.places += [(end_x + i * STEP * ux, end_y + i * STEP * uy) for i in on]
         demonstrated = np.array(self.speeds)[self.segments + [len(self.speeds) - 1] * LOOK_AHEAD]
         self.planned = bend_speeds(np.array(self.places), demonstrated, self.limits).tolist()
 
     def command(self, x, y, theta):
         """v in m/s and omega in rad/s for a pose in m and rad."""
         self.notice_kidnapping(x, y)
-        if distance(self.places[self.at], x, y) > STRAY:
+        if dist(self.places[self.at], (x, y)) > STRAY:
             self.plan(x, y)
         self.advance(x, y)
-        ahead_x, ahead_y = self.pursued(x, y)
-        error = wrapped(atan2(ahead_y - y, ahead_x - x) - theta)
-        curvature = 2 * sin(error) / max(hypot(ahead_x - x, ahead_y - y), STEP)
+        ahead = self.pursued(x, y)
+        error = wrapped(atan2(ahead[1] - y, ahead[0] - x) - theta)
+        curvature = 2 * sin(error) / max(dist(ahead, (x, y)), STEP)
         speed = self.pace * min(self.planned[self.at], self.limits.turn / max(abs(curvature), 1e-9))
         speed = self.safe(speed, x, y, theta)
         self.expect_progress(self.end - self.at, 0)
@@ -452,22 +434,11 @@ class Pursuit(Supervisor):
         off, and those after the turn nearer.
         """
         window = range(min(self.at + LOOK_AHEAD, self.end), self.at - 1, -1)
-        self.at = min(window, key=lambda i: distance(self.places[i], x, y))
+        self.at = min(window, key=lambda i: dist(self.places[i], (x, y)))
         if self.segments[self.at] != self.active:
             self.hand_over(self.segments[self.at])
         if self.at == self.end and self.guidance.reached(self.active, x, y, REACH):
             self.hand_over(self.active + 1)
-
-
-def unit(x, y):
-    """The vector (x, y) at unit length; zero stays zero."""
-    size = hypot(x, y) or 1.0
-    return x / size, y / size
-
-
-def distance(place, x, y):
-    """Distance in m from a place (x, y) to another."""
-    return hypot(place[0] - x, place[1] - y)
 
 
 def bend_speeds(places, speeds, limits):

@@ -22,6 +22,7 @@ from math import pi
 import numpy as np
 import scipy
 
+from dollop.checks import checked_array
 from dollop.gridmap import covered_cells, in_cells
 from dollop.pose import rotation
 from dollop.robot.avoidance import FREE_BELOW
@@ -31,25 +32,24 @@ __all__ = ["MonteCarloLocalizer"]
 SIGMA, WIDE_SIGMA = 0.10, 0.20
 """Standard deviations in m of the likelihood field: for particles, and for a lattice, which misses
 the true pose."""
-FLOOR = 0.10
-"""Likelihood of a beam that the map does not explain."""
-INDEPENDENT = 0.3
-"""Share of the beams that count: neighbours err together, where the map is wrong."""
+FLOOR, INDEPENDENT = 0.10, 0.3
+"""Likelihood of a beam that the map does not explain, and share of the beams that count: neighbours
+err together, where the map is wrong."""
 BEAM_STEP = 3
 """Every which beam is used (CARMEN: one in three degrees)."""
 LATTICE, HEADINGS = 0.15, 72
 """Distance in m between the poses of the lattice, and how many headings each place has."""
 TRACKING, SEARCHING = 250, 3000
 """Numbers of particles: while they agree (CARMEN's), and while they do not."""
-NARROW = (0.15, 0.15)
-"""Standard deviations in m and rad below which particles agree."""
+STARTING, NARROW = 0.05, 0.15
+"""Standard deviations in m and rad: of particles round a pose that is told, and below which they
+agree."""
 BELIEVED_AFTER, GIVEN_UP_AFTER = pi, 2 * pi
 """Angles in rad to turn until a pose that explains every scan is believed, and until the search
 starts anew."""
-LOST = 0.65
-"""Share of its long average below which the fit of a scan is in doubt."""
-DOUBTS = 3
-"""Scans in doubt, one after the other, that make a kidnapping."""
+LOST, DOUBTS = 0.65, 3
+"""Share of its long average below which the fit of a scan is in doubt, and how many scans in doubt,
+one after the other, make a kidnapping."""
 USUAL_FIT, FORGETTING = 0.8, 0.01
 """Long average of the fit to begin with, and its gain per scan."""
 
@@ -94,18 +94,18 @@ class MonteCarloLocalizer:
 
     def __init__(self, background, angles, environment=None, pose=None, laser_offset=0.0, seed=0):
         self._rng = np.random.default_rng(seed)
-        self._bearings, self._laser_offset = np.asarray(angles, dtype=float)[::BEAM_STEP], laser_offset
-        blocked = background.occupied
+        self._bearings = np.asarray(angles, dtype=float)[::BEAM_STEP]
+        self._laser_offset = laser_offset
+        blocked, frame = background.occupied, (background.origin, background.resolution)
         if environment is not None:
-            boxes = environment.boxes
-            blocked = blocked | covered_cells(boxes, background.origin, background.resolution, blocked.shape)
+            blocked = blocked | covered_cells(environment.boxes, *frame, blocked.shape)
         free = (background.occupancy < FREE_BELOW) & ~blocked
         if not free.any():
-            raise ValueError("the background must have a free cell for the robot to be in, got none")
-        surface = blocked & ~scipy.ndimage.binary_erosion(blocked, border_value=1)  # no beam ends inside what is solid
-        distances = scipy.ndimage.distance_transform_edt(~surface, sampling=background.resolution)
-        self._field = LikelihoodField(distances, SIGMA, background.origin, background.resolution)
-        self._wide_field = LikelihoodField(distances, WIDE_SIGMA, background.origin, background.resolution)
+            raise ValueError("the background must have a free cell to search, got none")
+        surface = blocked & ~scipy.ndimage.binary_erosion(blocked, border_value=1)  # where they end
+        away = scipy.ndimage.distance_transform_edt(~surface, sampling=background.resolution)
+        self._field = LikelihoodField(away, SIGMA, *frame)
+        self._wide_field = LikelihoodField(away, WIDE_SIGMA, *frame)
         self._lattice = lattice(free, background)
         self._usual_fit = USUAL_FIT
         self.pose, self.spread, self.fit = np.full(3, np.nan), np.full(2, np.inf), 0.0
@@ -119,25 +119,22 @@ class MonteCarloLocalizer:
         """Bool: whether the pose is to be believed: converged, and the last scan not in doubt."""
         return self.converged and self._doubts == 0
 
-    def start(self, pose, spread=(0.05, 0.05)):
-        """Believe a pose.
+    def start(self, pose):
+        """Believe a pose, to a few centimetres and degrees.
 
         Parameters
         ----------
         pose : (3,) sequence of float
             x, y in m, theta in rad.
-        spread : (float, float)
-            Standard deviations in m and rad.
 
         Raises
         ------
         ValueError
             If the pose is not finite.
         """
-        self.pose, self.spread, self.fit = np.array(pose, dtype=float), np.array(spread), self._usual_fit
-        if not np.isfinite(self.pose).all():
-            raise ValueError(f"pose must be finite, got {tuple(pose)}")
-        self.particles = self.pose + self._rng.standard_normal((TRACKING, 3)) * [spread[0], spread[0], spread[1]]
+        self.pose = checked_array("pose", pose, 3)
+        self.spread, self.fit = np.full(2, STARTING), self._usual_fit
+        self.particles = self.pose + STARTING * self._rng.standard_normal((TRACKING, 3))
         self.converged, self._doubts = True, 0
 
     def search(self):
@@ -174,19 +171,14 @@ class MonteCarloLocalizer:
         if self.converged:
             self._doubts = 0 if fits else self._doubts + 1
             self._usual_fit += FORGETTING * (self.fit - self._usual_fit) if fits else 0.0
-            if self._doubts >= DOUBTS:
-                self.search()
-            return
-        self._turned += turn
-        self._agreed = self._agreed + turn if fits and self._agreeing else 0.0
-        self.converged = self._agreed >= BELIEVED_AFTER
-        if not self.converged and self._turned > GIVEN_UP_AFTER:
+            in_vain = self._doubts >= DOUBTS
+        else:
+            self._turned += turn
+            self._agreed = self._agreed + turn if fits and self.spread.max() < NARROW else 0.0
+            self.converged = self._agreed >= BELIEVED_AFTER
+            in_vain = not self.converged and self._turned > GIVEN_UP_AFTER
+        if in_vain:
             self.search()
-
-    @property
-    def _agreeing(self):
-        """Whether the particles agree on one pose."""
-        return bool((self.spread < NARROW).all())
 
     def _beam_ends(self, ranges):
         """Where the used beams end in the robot's frame: (M, 2) in m."""
@@ -198,15 +190,17 @@ class MonteCarloLocalizer:
     def _draw(self, ends):
         """Particles (N, 3) from a scan: lattice poses by their likelihood, spread over meshes."""
         headings = np.arange(HEADINGS) * (2 * pi / HEADINGS)
-        scores = [self._wide_field.lattice_log_likelihoods(self._lattice, heading, ends[::2]) for heading in headings]
-        chances = softmax(2 * INDEPENDENT * np.concatenate(scores))
-        heading, place = np.divmod(self._rng.choice(len(chances), SEARCHING, p=chances), len(self._lattice))
-        meshes = self._rng.uniform(-0.5, 0.5, (SEARCHING, 3)) * [LATTICE, LATTICE, 2 * pi / HEADINGS]
+        score, few = self._wide_field.lattice_log_likelihoods, ends[::2]
+        scores = np.concatenate([score(self._lattice, heading, few) for heading in headings])
+        chosen = self._rng.choice(len(scores), SEARCHING, p=softmax(2 * INDEPENDENT * scores))
+        heading, place = np.divmod(chosen, len(self._lattice))
+        mesh = [LATTICE, LATTICE, 2 * pi / HEADINGS]
+        meshes = self._rng.uniform(-0.5, 0.5, (SEARCHING, 3)) * mesh
         return np.column_stack([self._lattice[place], headings[heading]]) + meshes
 
     def _resampled(self, weights):
         """Particles (N, 3) drawn with the weights by one comb, few if they agree."""
-        count = TRACKING if self._agreeing else SEARCHING
+        count = TRACKING if self.spread.max() < NARROW else SEARCHING
         comb = (np.arange(count) + self._rng.random()) / count
         chosen = np.searchsorted(np.cumsum(weights), comb).clip(max=len(weights) - 1)
         return self.particles[chosen]
@@ -228,8 +222,8 @@ class LikelihoodField:
     """
 
     def __init__(self, distances, sigma, origin, resolution):
-        self.reach = resolution * np.hypot(*distances.shape)  # a beam longer than that ends on the map from nowhere
-        border = int(np.ceil(self.reach / resolution)) + 2  # so wide that no beam from the map ends beyond it
+        self.reach = resolution * np.hypot(*distances.shape)  # no longer beam ends on the map
+        border = int(np.ceil(self.reach / resolution)) + 2  # so wide that none ends beyond it
         table = np.pad(np.exp(-0.5 * (distances / sigma) ** 2), border).astype(np.float32)
         self.columns, self.table = table.shape[1], table.ravel()
         self.log_table = np.log(FLOOR + (1 - FLOOR) * self.table)
@@ -248,8 +242,9 @@ class LikelihoodField:
     def lattice_log_likelihoods(self, places, heading, ends):
         """The same for places (N, 2) of one heading in rad, beams moved by whole cells: fast."""
         here = self.cells(np.column_stack([places, np.zeros(len(places))]), np.zeros((1, 2)))
-        there = np.rint(self.within_reach(ends) @ rotation(heading).T / self.resolution).astype(np.int32)
-        return self.log_table[here + (there[:, 1] * self.columns + there[:, 0])].sum(axis=1)
+        there = np.rint(self.within_reach(ends) @ rotation(heading).T / self.resolution)
+        column, row = there.astype(np.int32).T
+        return self.log_table[here + (row * self.columns + column)].sum(axis=1)
 
     def cells(self, poses, ends):
         """Flat index (N, M) of the cell where each beam ends."""
@@ -280,16 +275,12 @@ def moved_particles(particles, motion, rng):
     Standard deviations: 10 % of the way and 2 mm along it, 5 % and 2 mm across; 10 % of the turn,
     3 degrees per m and 0.1 degrees.
     """
-    ahead, left, turn = motion
-    way = np.hypot(ahead, left)
-    along, across = 0.10 * way + 0.002, 0.05 * way + 0.002
-    errors = rng.standard_normal((len(particles), 3)) * [along, across, 0.10 * abs(turn) + 0.05 * way + 0.002]
-    middle = particles[:, 2] + turn / 2
-    steps = errors + [ahead, left, turn]
-    moved = particles + steps
-    moved[:, 0] = particles[:, 0] + np.cos(middle) * steps[:, 0] - np.sin(middle) * steps[:, 1]
-    moved[:, 1] = particles[:, 1] + np.sin(middle) * steps[:, 0] + np.cos(middle) * steps[:, 1]
-    return moved
+    way, turn = np.hypot(*motion[:2]), motion[2]
+    errors = [0.10 * way + 0.002, 0.05 * way + 0.002, 0.10 * abs(turn) + 0.05 * way + 0.002]
+    ahead, left, turned = (rng.standard_normal((len(particles), 3)) * errors + motion).T
+    x, y, theta = particles.T
+    c, s = np.cos(theta + turn / 2), np.sin(theta + turn / 2)
+    return np.column_stack([x + c * ahead - s * left, y + s * ahead + c * left, theta + turned])
 
 
 def softmax(scores):

@@ -7,12 +7,12 @@ that can feel what it touches has `touching`; a simulated one has `true_pose`, f
 """
 
 from dataclasses import dataclass
-from math import cos, isfinite, sin
+from math import isfinite
 
 import numpy as np
 
-from dollop.checks import check_choice
-from dollop.pose import wrapped
+from dollop.checks import check_choice, check_positive
+from dollop.pose import moved_pose
 from dollop.robot.avoidance import ObstacleMap
 from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits, clip
 
@@ -126,10 +126,8 @@ class Unicycle:
         limits, period = self.limits, self.period
         self.speed = approach(self.speed, clip(speed, limits.speed), limits.acceleration * period)
         self.turn = approach(self.turn, clip(turn, limits.turn), limits.turn_acceleration * period)
-        x, y, theta = self.pose
-        middle = theta + self.turn * period / 2
-        way = self.speed * period
-        self.pose = x + way * cos(middle), y + way * sin(middle), wrapped(theta + self.turn * period)
+        arc = self.speed * period, self.turn * period
+        self.pose = tuple(moved_pose(self.pose, *arc).tolist())
 
 
 def approach(value, goal, step):
@@ -138,14 +136,7 @@ def approach(value, goal, step):
 
 
 def perform(
-    task,
-    robot,
-    control="pursuit",
-    avoid=True,
-    background=None,
-    kidnap=(),
-    timeout=600.0,
-    localise_within=120.0,
+    task, robot, control="pursuit", avoid=True, background=None, kidnap=(), timeout=600.0, localise_within=120.0
 ):
     """Let a robot perform a task (Sec. III; Fig. 7, 10, 12).
 
@@ -193,16 +184,19 @@ def perform(
     """
     check_choice("control", control, CONTROL_LAWS)
     if not (timeout > 0 and localise_within > 0):
-        raise ValueError(f"timeout and localise_within must be positive, got {timeout} and {localise_within}")
+        given = f"{timeout} and {localise_within}"
+        raise ValueError(f"timeout and localise_within must be positive, got {given}")
     kidnap = sorted((float(time), tuple(pose)) for time, pose in kidnap)
     places = named_places(task.law, robot, kidnap)
     obstacles = ObstacleMap.of(task.environment, background, [place[:2] for _, place in places])
     check_free(places, obstacles)
-    supervisor = CONTROL_LAWS[control](Guidance(task.law, obstacles if avoid else None), task.law.speeds, robot)
+    guidance = Guidance(task.law, obstacles if avoid else None)
+    supervisor = CONTROL_LAWS[control](guidance, task.law.speeds, robot)
     records, reason = drive(supervisor, robot, list(kidnap), timeout, localise_within)
     robot.drive(0.0, 0.0)
-    lasted = len(records) * robot.period
-    return as_run(records, reason, obstacles, robot.period, [time for time, _ in kidnap if time < lasted])
+    t = np.arange(len(records)) * robot.period
+    kidnapped = [time for time, _ in kidnap if time < len(records) * robot.period]
+    return as_run(t, records, reason, obstacles, kidnapped)
 
 
 class Search:
@@ -237,7 +231,8 @@ def drive(supervisor, robot, kidnap, timeout, localise_within):
             robot.place(kidnap.pop(0)[1])
         x, y, theta = pose = robot.pose
         touching = getattr(robot, "touching", None)
-        records.append((pose, getattr(robot, "true_pose", pose), supervisor.active, robot.localised, touching))
+        true_pose = getattr(robot, "true_pose", pose)
+        records.append((pose, true_pose, supervisor.active, robot.localised, touching))
         if not isfinite(x + y + theta):
             return records, f"the pose must be finite, got {x, y, theta} at {now:.1f} s"
         if robot.localised:
@@ -255,23 +250,15 @@ def drive(supervisor, robot, kidnap, timeout, localise_within):
         robot.drive(*command)
 
 
-def as_run(records, reason, obstacles, period, kidnapped):
-    """The records of the control loop as a Run."""
-    poses, true_poses, active, localised, touching = (np.array(column) for column in zip(*records, strict=True))
+def as_run(t, records, reason, obstacles, kidnapped):
+    """The records of the control loop at times (N,) in s as a Run."""
+    *poses, active, localised, touching = map(np.array, zip(*records, strict=True))
+    poses, true_poses = (each.astype(float) for each in poses)
     clearance = obstacles.edges(true_poses[:, :2])
     contact = clearance < 0 if touching[0] is None else touching.astype(bool)
-    return Run(
-        t=np.arange(len(poses)) * period,
-        poses=poses.astype(float),
-        true_poses=true_poses.astype(float),
-        active=active,
-        localised=localised,
-        clearance=clearance,
-        finished=not reason,
-        reason=reason,
-        collisions=int(np.count_nonzero(np.diff(contact, prepend=False) & contact)),
-        kidnapped=np.array(kidnapped, dtype=float),
-    )
+    collisions = int(np.count_nonzero(np.diff(contact, prepend=False) & contact))
+    told = t, poses, true_poses, active, localised, clearance
+    return Run(*told, not reason, reason, collisions, np.array(kidnapped, dtype=float))
 
 
 def named_places(law, robot, kidnap):
@@ -286,8 +273,7 @@ def named_places(law, robot, kidnap):
     if robot.localised:
         places.append(("the start", robot.pose))
     for time, pose in kidnap:
-        if not 0 <= time < np.inf:
-            raise ValueError(f"the time of a kidnapping must be 0 s or later, got {time:g}")
+        check_positive("the time of a kidnapping", time, or_zero=True)
         places.append((f"the pose of the kidnapping at {time:g} s", pose))
     for name, place in places:
         if not np.isfinite(place).all():
@@ -298,7 +284,8 @@ def named_places(law, robot, kidnap):
 def check_free(places, obstacles):
     """Raise ValueError for a named place that is off the map or in an obstacle."""
     for name, (x, y, *_) in places:
+        there = f"got ({x:.2f}, {y:.2f}), which is"
         if not obstacles.holds(x, y):
-            raise ValueError(f"{name} must lie in the lab, got ({x:.2f}, {y:.2f}), which is off the map")
+            raise ValueError(f"{name} must lie in the lab, {there} off the map")
         if obstacles.edge(x, y) <= -obstacles.radius:
-            raise ValueError(f"{name} must be free, got ({x:.2f}, {y:.2f}), which is in an obstacle or unknown")
+            raise ValueError(f"{name} must be free, {there} in an obstacle or unknown")
