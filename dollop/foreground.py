@@ -13,8 +13,6 @@ import scipy
 from dollop.checks import check_positive
 from dollop.gridmap import in_metres
 
-_EIGHT_CONNECTED = np.ones((3, 3), dtype=bool)
-
 
 @dataclass(frozen=True, eq=False)
 class Blobs:
@@ -82,19 +80,13 @@ def foreground_mask(points, background, background_radius=0.20):
         finite.
     """
     check_positive("background_radius", background_radius)
-    flat = points.reshape(-1, 2)
-    returned = np.isfinite(flat[:, 0])
-    covered = returned.copy()
-    covered[returned] = background.covers(flat[returned])
-    outside = returned.sum() - covered.sum()
-    if outside > 0.1 * returned.sum():
-        raise ValueError(
-            f"the background map must cover the scans: {outside} of {returned.sum()} readings "
-            f"({100 * outside / returned.sum():.0f} %) lie outside it"
-        )
-    mask = covered
-    mask[covered] = background.distance_at(flat[covered]) > background_radius
-    return mask.reshape(points.shape[:-1])
+    distances = background.distance_at(points)  # nan outside the map
+    returned = np.count_nonzero(np.isfinite(points[..., 0]))
+    outside = returned - np.count_nonzero(~np.isnan(distances))
+    if outside > 0.1 * returned:
+        lie = f"{outside} of {returned} readings ({100 * outside / returned:.0f} %) lie outside it"
+        raise ValueError(f"the background map must cover the scans: {lie}")
+    return distances > background_radius
 
 
 def surface_points(points, mask, spacing=0.05, jump=0.30):
@@ -256,8 +248,7 @@ class ForegroundGrid:
             m.
         """
         row, column = np.divmod(cells, self.shape[1])
-        places = in_metres(column + 0.5, row + 0.5, self.origin, self.resolution)
-        return np.column_stack(places)
+        return np.column_stack(in_metres(column + 0.5, row + 0.5, self.origin, self.resolution))
 
     def blobs(self, threshold=0.5, min_area=0.01):
         """Blobs of occupied cells, remembered ones included (Sec. II).
@@ -274,7 +265,8 @@ class ForegroundGrid:
         Blobs
         """
         occupied = self._active[self.value[self._active] > threshold]
-        return find_blobs(np.column_stack(np.divmod(occupied, self.shape[1])), self.resolution, min_area)
+        cells = np.column_stack(np.divmod(occupied, self.shape[1]))
+        return find_blobs(cells, self.resolution, min_area)
 
     def objects(self, threshold=0.5, min_area=0.01, stride=0.0):
         """Centroids of the foreground objects that the last scan met (Sec. II).
@@ -364,7 +356,7 @@ def find_blobs(cells, resolution, min_area=0.01):
     rows, columns = _closed_up(cells[:, 0]), _closed_up(cells[:, 1])
     window = np.zeros((rows.max() + 1, columns.max() + 1), dtype=bool)
     window[rows, columns] = True
-    labelled, count = scipy.ndimage.label(window, _EIGHT_CONNECTED)
+    labelled, count = scipy.ndimage.label(window, np.ones((3, 3)))  # adjacent also at corners
     labels = labelled[rows, columns] - 1
     areas = resolution**2 * np.bincount(labels, minlength=count)
     large = areas >= min_area - 1e-12

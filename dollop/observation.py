@@ -6,14 +6,7 @@ import numpy as np
 
 from dollop.checks import check_positive
 from dollop.environment import Environment
-from dollop.foreground import (
-    ForegroundGrid,
-    bounding_boxes,
-    endpoints,
-    foreground_mask,
-    seen_free,
-    surface_points,
-)
+from dollop.foreground import ForegroundGrid, bounding_boxes, endpoints, foreground_mask, seen_free, surface_points
 from dollop.gridmap import flat_cells
 from dollop.tracking import Track, Tracker, identify_user, track_objects, user_track
 
@@ -49,15 +42,7 @@ class Observation:
 
 
 def observe(
-    log,
-    background,
-    background_radius=0.20,
-    gain=0.6,
-    static_gain=0.1,
-    min_area=0.01,
-    stride=0.0,
-    tracker=None,
-    seed=0,
+    log, background, background_radius=0.20, gain=0.6, static_gain=0.1, min_area=0.01, stride=0.0, tracker=None, seed=0
 ):
     """Observe a demonstration with the laser (Sec. II).
 
@@ -141,9 +126,9 @@ def foreground_hits(log, background, background_radius=0.20):
     """
     points = endpoints(log)
     mask = foreground_mask(points, background, background_radius)
-    scan, on_surface = surface_points(points, mask, spacing=background.resolution)
+    scan, surface = surface_points(points, mask, spacing=background.resolution)
     grid = background.origin, background.resolution, background.occupancy.shape
-    cells, inside = flat_cells(on_surface, *grid)
+    cells, inside = flat_cells(surface, *grid)
     return np.split(cells, np.searchsorted(scan[inside], np.arange(1, len(log.t))))
 
 
@@ -176,11 +161,13 @@ def static_boxes(grid, sensor, user=None, min_area=0.01, recent=1.0):
     boxes = bounding_boxes(blobs, grid.origin, grid.resolution)
     for k in range(len(blobs)):
         cells = blobs.cells[blobs.labels == k]
-        boxes[k] = completed(boxes[k], grid.centres(cells @ [grid.shape[1], 1]), sensor, grid.resolution)
+        seen = grid.centres(cells @ [grid.shape[1], 1])
+        boxes[k] = completed(boxes[k], seen, sensor, grid.resolution)
     if user is None:
         return boxes
-    last = user.positions[user.t > user.t[-1] - recent]
-    inside = (last[:, None] >= boxes[:, :2] - grid.resolution) & (last[:, None] <= boxes[:, 2:] + grid.resolution)
+    last = user.positions[user.t > user.t[-1] - recent, None]
+    low, high = boxes[:, :2] - grid.resolution, boxes[:, 2:] + grid.resolution
+    inside = (low <= last) & (last <= high)
     return boxes[~inside.all(axis=2).any(axis=0)]
 
 
@@ -191,8 +178,9 @@ def completed(box, seen, sensor, resolution):
     """
     sight = seen.mean(axis=0) - sensor
     sight = sight / np.hypot(*sight)
-    along, across = (seen - sensor) @ sight, (seen - sensor) @ np.array([-sight[1], sight[0]])
+    aside = np.array([-sight[1], sight[0]])
+    along, across = (seen - sensor) @ sight, (seen - sensor) @ aside
     half = (np.ptp(across) + resolution) / 2
-    middle = np.array([along.min() - resolution / 2 + half, (across.min() + across.max()) / 2])
-    centre = sensor + middle[0] * sight + middle[1] * np.array([-sight[1], sight[0]])
+    depth = along.min() - resolution / 2 + half
+    centre = sensor + depth * sight + (across.min() + across.max()) / 2 * aside
     return np.concatenate([np.minimum(box[:2], centre - half), np.maximum(box[2:], centre + half)])

@@ -10,7 +10,7 @@ n carries n x 2 means and one n x n covariance:
 """
 
 from dataclasses import dataclass
-from math import factorial
+from functools import partial
 
 import numpy as np
 import scipy
@@ -107,13 +107,12 @@ class Motion:
         (True, True)
         """
         n = self.order
-        F = np.array([[dt ** (j - i) / factorial(j - i) if j >= i else 0.0 for j in range(n)] for i in range(n)])
-        Q = np.empty((n, n))
-        for i in range(n):
-            for j in range(n):
-                power = 2 * n - 1 - i - j
-                Q[i, j] = dt**power / (power * factorial(n - 1 - i) * factorial(n - 1 - j))
-        return F, self.noise * Q
+        F = np.array([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]])
+        position = dt**5 / 20, dt**4 / 8, dt**3 / 6
+        velocity = dt**4 / 8, dt**3 / 3, dt**2 / 2
+        acceleration = dt**3 / 6, dt**2 / 2, dt
+        Q = self.noise * np.array([position, velocity, acceleration])
+        return F[:n, :n], Q[-n:, -n:]
 
     def birth(self, positions):
         """States of objects at first sight, their velocity unknown (a reconstruction).
@@ -133,7 +132,8 @@ class Motion:
         """
         means = np.zeros((len(positions), self.order, 2))
         means[:, 0] = positions
-        return means, np.tile(np.diag([self.measurement_sd**2, 1.0, 1.0][: self.order]), (len(positions), 1, 1))
+        variances = [self.measurement_sd**2, 1.0, 1.0][: self.order]
+        return means, np.tile(np.diag(variances), (len(positions), 1, 1))
 
 
 def predict(means, covariances, F, Q):
@@ -213,16 +213,13 @@ def match_greedily(cost, gate):
     >>> match_greedily(np.array([[1.0, 2.0], [3.0, 9.0]]), 10)
     (array([0, 1]), array([0, 1]))
     """
-    tracks, objects = [], []
+    pairs = []
     open_cost = np.where(cost <= gate, cost, np.inf)
-    for _ in range(min(cost.shape)):
+    while open_cost.min(initial=np.inf) < np.inf:
         k, m = divmod(int(open_cost.argmin()), cost.shape[1])
-        if open_cost[k, m] == np.inf:
-            break
-        tracks.append(k)
-        objects.append(m)
         open_cost[k, :] = open_cost[:, m] = np.inf
-    return np.array(tracks, int), np.array(objects, int)
+        pairs.append((k, m))
+    return tuple(np.array(pairs, int).reshape(-1, 2).T)
 
 
 def match_jointly(cost, gate):
@@ -248,8 +245,6 @@ def match_jointly(cost, gate):
     >>> match_jointly(np.array([[1.0, 2.0], [3.0, 9.0]]), 10)
     (array([0, 1]), array([1, 0]))
     """
-    if not cost.size:
-        return np.zeros(0, int), np.zeros(0, int)
     tracks, objects = scipy.optimize.linear_sum_assignment(np.minimum(cost, gate))
     within = cost[tracks, objects] <= gate
     return tracks[within], objects[within]
@@ -337,34 +332,30 @@ def track_objects(t, objects, tracker=None, visible=None, seed=0):
     tracker = tracker or Tracker()
     state = _Tracks(tracker, np.random.default_rng(seed))
     intervals = np.diff(t, prepend=t[0])
-    transitions = {dt: tracker.motion.transition(dt) for dt in np.unique(intervals)}
+    models = {dt: tracker.motion.transition(dt) for dt in np.unique(intervals)}
     for i, dt in enumerate(intervals):
-        state.predict(*transitions[dt], None if visible is None else lambda points, i=i: visible(i, points))
+        state.predict(*models[dt], visible and partial(visible, i))
         state.match(objects[i], t[i])
-        state.note(i)
-    return state.tracks(t)
+    return state.tracks()
 
 
 class _Tracks:
     """The tracks alive now, as arrays over K tracks, and the diary of all that have lived."""
 
+    COLUMNS = "means", "covariances", "measured", "seen", "name"
+
     def __init__(self, tracker, rng):
         self.tracker, self.rng = tracker, rng
         self.means, self.covariances = tracker.motion.birth(np.zeros((0, 2)))
-        self.measured = np.zeros((0, 2))
-        self.seen = np.zeros(0)
-        self.name = np.zeros(0, int)
-        self.born = 0
-        self.particles = {}
-        self.diary = []
+        self.measured, self.seen, self.name = np.zeros((0, 2)), np.zeros(0), np.zeros(0, int)
+        self.born, self.particles, self.diary = 0, {}, []
 
     def predict(self, F, Q, visible):
         """Kalman prediction; occluded tracks by particles where that was chosen."""
-        occluded = np.isnan(self.measured[:, 0])
         before = self.means, self.covariances
         self.means, self.covariances = predict(*before, F, Q)
         if self.tracker.occlusion == "particles":
-            for k in np.flatnonzero(occluded):
+            for k in np.flatnonzero(np.isnan(self.measured[:, 0])):
                 cloud = self.particles.get(self.name[k])
                 if cloud is None:
                     cloud = draw_particles(before[0][k], before[1][k], self.rng)
@@ -374,51 +365,45 @@ class _Tracks:
 
     def match(self, objects, now):
         """Match predictions to `objects` (M, 2), update, and let the unmatched go or be born."""
-        tracker, motion = self.tracker, self.tracker.motion
+        tracker, noise = self.tracker, self.tracker.motion.measurement_sd
         offset = self.means[:, None, 0] - objects[None]
-        sd = np.sqrt(self.covariances[:, 0, 0] + motion.measurement_sd**2)
+        sd = np.sqrt(self.covariances[:, 0, 0] + noise**2)
         scale = np.clip(sd, tracker.gate_min / tracker.gate, tracker.gate_max / tracker.gate)
         cost = np.hypot(offset[..., 0], offset[..., 1]) / scale[:, None]
         matched, found = MATCHERS[tracker.matching](cost, tracker.gate)
         self.measured = np.full((len(self.means), 2), np.nan)
         self.measured[matched] = objects[found]
-        self.means[matched], self.covariances[matched] = update(
-            self.means[matched], self.covariances[matched], objects[found], motion.measurement_sd
-        )
+        predicted = self.means[matched], self.covariances[matched]
+        corrected = update(*predicted, objects[found], noise)
+        self.means[matched], self.covariances[matched] = corrected
         self.seen[matched] = now
         for name in self.name[matched]:
             self.particles.pop(name, None)
-        self._keep(now - self.seen <= tracker.disappear_after)
-        self._bear(np.delete(objects, found, axis=0), now)
+        alive = now - self.seen <= tracker.disappear_after
+        if not alive.all() or len(found) < len(objects):
+            self._renew(alive, np.delete(objects, found, axis=0), now)
+        times = np.full(len(self.name), now)
+        self.diary.append((self.name, times, self.means[:, :2], self.measured))
 
-    def _keep(self, alive):
-        if not alive.all():
-            self.means, self.covariances = self.means[alive], self.covariances[alive]
-            self.measured, self.seen, self.name = self.measured[alive], self.seen[alive], self.name[alive]
+    def _renew(self, alive, objects, now):
+        """Let go of the tracks that are not alive, and let one be born for each object (M, 2)."""
+        names = self.born + np.arange(len(objects))
+        newborn = *self.tracker.motion.birth(objects), objects, np.full(len(objects), now), names
+        for column, values in zip(self.COLUMNS, newborn, strict=True):
+            setattr(self, column, np.concatenate([getattr(self, column)[alive], values]))
+        self.born += len(objects)
 
-    def _bear(self, objects, now):
-        if len(objects):
-            means, covariances = self.tracker.motion.birth(objects)
-            self.means = np.concatenate([self.means, means])
-            self.covariances = np.concatenate([self.covariances, covariances])
-            self.measured = np.concatenate([self.measured, objects])
-            self.seen = np.concatenate([self.seen, np.full(len(objects), now)])
-            self.name = np.concatenate([self.name, self.born + np.arange(len(objects))])
-            self.born += len(objects)
-
-    def note(self, i):
-        self.diary.append((self.name, np.full(len(self.name), i), self.means[:, :2].copy(), self.measured))
-
-    def tracks(self, t):
+    def tracks(self):
         """Every track that lived, cut after it was last seen."""
-        name, scan, means, measured = (np.concatenate(column) for column in zip(*self.diary, strict=True))
+        name, t, means, measured = map(np.concatenate, zip(*self.diary, strict=True))
         order = np.argsort(name, kind="stable")
+        starts = np.searchsorted(name[order], np.arange(self.born))
+        seen = np.isfinite(measured[:, 0])
         tracks = []
-        for rows in np.split(order, np.flatnonzero(np.diff(name[order])) + 1) if len(order) else []:
-            seen = np.flatnonzero(np.isfinite(measured[rows, 0]))
-            rows = rows[: seen[-1] + 1]
-            position, velocity = means[rows, 0], means[rows, 1]
-            tracks.append(Track(t[scan[rows]], position, velocity, np.isnan(measured[rows, 0]), measured[rows]))
+        for rows in np.split(order, starts)[1:]:
+            rows = rows[: np.flatnonzero(seen[rows])[-1] + 1]
+            state = means[rows, 0], means[rows, 1]
+            tracks.append(Track(t[rows], *state, ~seen[rows], measured[rows]))
         return tuple(tracks)
 
 
@@ -485,7 +470,8 @@ def particle_moments(particles):
     """
     mean = particles.mean(axis=0)
     spread = particles - mean
-    return mean, np.einsum("pia,pja->ij", spread, spread) / (2 * len(particles)) + 1e-9 * np.eye(len(mean))
+    covariance = np.einsum("pia,pja->ij", spread, spread) / (2 * len(particles))
+    return mean, covariance + 1e-9 * np.eye(len(mean))
 
 
 def smooth(t, measurements, motion=None):
@@ -516,7 +502,14 @@ def smooth(t, measurements, motion=None):
     True
     """
     filtered, predicted, transitions = kalman_filter(t, measurements, motion or Motion())
-    return _smooth_backwards(filtered, predicted, transitions)
+    x, P = map(np.concatenate, zip(*filtered, strict=True))
+    if predicted:
+        ahead, ahead_P = map(np.concatenate, zip(*predicted, strict=True))
+        gains = P[:-1] @ np.transpose(transitions, (0, 2, 1)) @ np.linalg.inv(ahead_P)
+        for n in reversed(range(len(gains))):
+            # x_n <- x_n + P_n F^T P_{n+1|n}^-1 (x_{n+1} - x_{n+1|n})
+            x[n] += gains[n] @ (x[n + 1] - ahead[n])
+    return x[:, 0], x[:, 1]
 
 
 def kalman_filter(t, measurements, motion, carry_on=None):
@@ -541,33 +534,19 @@ def kalman_filter(t, measurements, motion, carry_on=None):
     transitions : list of N - 1 (n, n) float arrays
         F between each scan and the next.
     """
-    means, covariances = motion.birth(measurements[:1])
+    state = motion.birth(measurements[:1])
     models = {dt: motion.transition(dt) for dt in np.unique(np.diff(t))}
-    filtered, predicted, transitions = [(means, covariances)], [], []
+    filtered, predicted, transitions = [state], [], []
     for i, (dt, z) in enumerate(zip(np.diff(t), measurements[1:], strict=True), start=1):
         F, Q = models[dt]
         seen = np.isfinite(z[0])
-        if seen or carry_on is None:
-            means, covariances = predict(means, covariances, F, Q)
-        else:
-            means, covariances = carry_on(i, means, covariances, F, Q)
-        predicted.append((means, covariances))
+        state = predict(*state, F, Q) if seen or not carry_on else carry_on(i, *state, F, Q)
+        predicted.append(state)
         transitions.append(F)
         if seen:
-            means, covariances = update(means, covariances, z[None], motion.measurement_sd)
-        filtered.append((means, covariances))
+            state = update(*state, z[None], motion.measurement_sd)
+        filtered.append(state)
     return filtered, predicted, transitions
-
-
-def _smooth_backwards(filtered, predicted, transitions):
-    """The backward pass: x_n <- x_n + P_n F^T P_{n+1|n}^-1 (x_{n+1} - x_{n+1|n}), from the last state to the first."""
-    x, P = (np.concatenate(column) for column in zip(*filtered, strict=True))
-    if predicted:
-        ahead, ahead_P = (np.concatenate(column) for column in zip(*predicted, strict=True))
-        gains = P[:-1] @ np.transpose(transitions, (0, 2, 1)) @ np.linalg.inv(ahead_P)
-        for n in reversed(range(len(gains))):
-            x[n] += gains[n] @ (x[n + 1] - ahead[n])
-    return x[:, 0], x[:, 1]
 
 
 def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):
@@ -647,5 +626,6 @@ def user_track(t, tracks, users, motion=None):
     if not len(seen):
         return None
     lived = slice(seen[0], seen[-1] + 1)
-    positions, velocities = smooth(t[lived], measurements[lived], motion)
-    return Track(t[lived], positions, velocities, np.isnan(measurements[lived, 0]), measurements[lived])
+    t, measurements = t[lived], measurements[lived]
+    states = smooth(t, measurements, motion)
+    return Track(t, *states, np.isnan(measurements[:, 0]), measurements)
