@@ -25,11 +25,11 @@ from dollop.tracking import (
     Tracker,
     draw_particles,
     identify_user,
+    kalman_filter,
     move_particles,
     particle_moments,
     predict,
     track_objects,
-    update,
 )
 from dollop.trajectory import distance_to_polyline
 
@@ -171,28 +171,10 @@ def hidden_error(seed, hide, *model):
 def causal_states(t, shown, motion, carry_on=None):
     """State (N, n, 2) at each scan from the centroids (N, 2) so far, predicted where they are nan.
 
-    Parameters
-    ----------
-    carry_on : callable, optional
-        carry_on(i, means, covariances, F, Q) predicts over scans out of sight; the Kalman
-        prediction by default.
+    What predicts over scans out of sight is `carry_on`, as `kalman_filter` takes it.
     """
-    means, covariances = motion.birth(shown[:1])
-    states = [means[0]]
-    for i, (dt, z) in enumerate(zip(np.diff(t), shown[1:], strict=True), start=1):
-        F, Q = motion.transition(dt)
-        if np.isfinite(z[0]):
-            predicted = predict(means, covariances, F, Q)
-            means, covariances = update(*predicted, z[None], motion.measurement_sd)
-        else:
-            means, covariances = (carry_on or ahead)(i, means, covariances, F, Q)
-        states.append(means[0])
-    return np.array(states)
-
-
-def ahead(i, means, covariances, F, Q):
-    """Kalman prediction, whichever the scan."""
-    return predict(means, covariances, F, Q)
+    filtered, _, _ = kalman_filter(t, shown, motion, carry_on)
+    return np.concatenate([means for means, _ in filtered])
 
 
 def standing_still(i, means, covariances, F, Q):
