@@ -6,7 +6,6 @@ Tol's: colour-blind readers can tell them apart. Red boxes, green law and yellow
 paper's. Black is for what is neutral: subgoals, corners, readings, writing.
 """
 
-import io
 from contextlib import contextmanager
 from itertools import pairwise
 
@@ -26,20 +25,6 @@ OCCLUDED = "#E69F00"  # orange: predictions while the user is occluded
 BACKGROUND = "#8C8C8C"  # grey: the background map, and how things were before
 TRUTH = "#56B4E9"  # light blue: where the user or an object really was
 RAY = "#C3CED6"  # pale grey: the laser's rays
-SPRING = "#8296A8"  # slate: springs between corners
-FORCE = "#EE3377"  # magenta: the forces that they exert
-
-METHODS = {
-    "literal": "#999933",  # olive: the paper's matching
-    "robust": "#332288",  # indigo: what Dollop does by default, here ...
-    "merging": "#332288",  # ... and here
-    "plain mean": "#5F6B73",
-    "HMM, BIC": "#661100",  # browns: the two hidden Markov models
-    "left-to-right HMM, BIC": "#BF8B5E",
-}
-"""Colours of the methods that are compared, by their names in `dollop.match` and
-`dollop.replication.baseline`.
-"""
 
 RUN_SHADES = ("#CC79A7", "#7A3B62", "#E3A9C8", "#A6437C", "#4F2340")
 RUN_LINES = ("-", (0, (7, 1.5)), (0, (5, 1.2, 1, 1.2)), (0, (3, 1)), (0, (9, 1.5, 1, 1.5, 1, 1.5)))
@@ -174,15 +159,6 @@ def track(ax, track, label="track", **kwargs):
     ax.plot(*track.positions[track.occluded].T, ".", color=OCCLUDED, markersize=4, zorder=3, label="occluded")
 
 
-def picture(image):
-    """A rendered image (H, W, 3) as a figure of exactly its pixels."""
-    height, width = image.shape[:2]
-    dpi = STYLE["savefig.dpi"]
-    figure = plt.figure(figsize=(width / dpi, height / dpi), layout="none")
-    figure.figimage(image, resize=False)
-    return figure
-
-
 def runs(ax, runs):
     """Where the robot went: one line per Run.
 
@@ -217,14 +193,6 @@ def first_contact(run):
     """
     met = np.flatnonzero(run.clearance < 0)
     return run.true_poses[met[0] if len(met) else run.clearance.argmin(), :2]
-
-
-def png(figure):
-    """A figure as PNG bytes, for an `ipywidgets.Image`; the figure is closed."""
-    with io.BytesIO() as stream:
-        figure.savefig(stream, format="png", dpi=figure.dpi)
-        plt.close(figure)
-        return stream.getvalue()
 
 
 def cdhmm(ax, model, sd=2.0):
@@ -277,12 +245,3 @@ def ellipse(ax, mean, covariance, sd=2.0, colour=SUBGOAL, label=None):
     angle = np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))
     look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15, "zorder": 3}
     ax.add_patch(Ellipse(mean, width, height, angle=angle, label=label, **look))
-
-
-def legend_below(figure, *axes, columns=6):
-    """One legend for what is drawn in the axes named, under the whole figure."""
-    shown = {}
-    for ax in axes:
-        handles, labels = ax.get_legend_handles_labels()
-        shown = dict(zip(labels, handles, strict=True)) | shown
-    figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=columns, columnspacing=1.0)

@@ -8,7 +8,7 @@ import numpy as np
 from dollop import plot
 from dollop.environment import Environment, spring_constants, spring_forces
 from dollop.matching import match
-from dollop.replication import recordings
+from dollop.replication import drawing, recordings
 from dollop.replication.figures.controls import COLUMNS, CONTROLS, at_once, by_kind, draw_runs, numbers
 from dollop.replication.figures.panel import panel
 from dollop.replication.layouts import matching_shares
@@ -44,7 +44,7 @@ def figure_8():
         label = {"literal": "literal (the paper's cost)", "robust": "robust (the default)"}[method]
         for a, b in enumerate(matching.indices):
             ends = before.corners[a], aside.corners[b]
-            plot.path(ax, ends, None if a else label, plot.METHODS[method], **look)
+            plot.path(ax, ends, None if a else label, drawing.METHODS[method], **look)
     for environment, names, up, words in (  # names stand a little up or down, clear of the lines
         (before, "12345678", (-0.05, 0.04, 0.04, 0.05), "as demonstrated"),
         (aside, ascii_lowercase[:8], (-0.05, -0.04, -0.04, 0.03), "now"),
@@ -57,7 +57,7 @@ def figure_8():
     ax.text(2.7, 0.65, "1 m", ha="center", va="bottom")
     ax.set_aspect("equal")
     ax.set_axis_off()
-    plot.legend_below(figure, ax)
+    drawing.legend_below(figure, ax)
     return figure, matching_numbers(before, after)
 
 
@@ -101,7 +101,7 @@ def figure_9():
     low, high = corners.min(axis=0) - 0.35, corners.max(axis=0) + 0.35
     left.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title="springs, wider where stronger")
     arrows = {"angles": "xy", "scale_units": "xy", "scale": 110, "width": 0.015}
-    right.quiver(*corners.T, *spring_forces(corners).T, color=plot.FORCE, zorder=5, **arrows)
+    right.quiver(*corners.T, *spring_forces(corners).T, color=drawing.FORCE, zorder=5, **arrows)
     middle = environment.centres[environment.centres[:, 0].argmin()]
     right.set(xlim=middle[0] + [-0.3, 0.3], ylim=middle[1] + [-0.3, 0.3])
     right.set(title="one box, with the forces", ylabel="")
@@ -114,7 +114,7 @@ def draw_springs(ax, corners):
     for m in range(len(corners)):
         for n in range(m):
             width = 0.5 + 1.5 * np.log10(constants[m, n] / constants[constants > 0].min())
-            ax.plot(*corners[[m, n]].T, color=plot.SPRING, linewidth=width, alpha=0.6, zorder=1)
+            ax.plot(*corners[[m, n]].T, color=drawing.SPRING, linewidth=width, alpha=0.6, zorder=1)
 
 
 @panel("10a")
@@ -136,7 +136,7 @@ def figure_10a():
         ax.plot(*task.law.subgoals.T, "x", **grey)
         plot.subgoals(ax, adapted.law.subgoals)
     show_part(axes, (0.2, 5.3))
-    plot.legend_below(figure, axes[0])
+    drawing.legend_below(figure, axes[0])
     return figure, {"layouts": len(axes)} | adapting()
 
 
@@ -170,7 +170,7 @@ def figure_10b():
             draw_runs(ax, recordings.adapted_task(k), runs_of[kind][k], f"layout {k + 1}")
         axes[1].set_title(f"{title}\nlayout 2")
     show_part(rows.flat, (1.3, 5.3))
-    plot.legend_below(figure, *rows.flat)
+    drawing.legend_below(figure, *rows.flat)
     return figure, adapting() | numbers({kind: sum(runs, []) for kind, runs in runs_of.items()})
 
 
@@ -203,7 +203,7 @@ def figure_x1():
 def draw_shares_by_noise(ax, shares):
     """Share of random layouts all right by the noise of boxes, a line per method and number."""
     for (method, objects), rows in shares.groupby(["method", "objects"]):
-        look = {"color": plot.METHODS[method], "marker": {2: "o", 3: "s", 4: "^"}[objects]}
+        look = {"color": drawing.METHODS[method], "marker": {2: "o", 3: "s", 4: "^"}[objects]}
         ax.plot(rows.noise, rows.right, label=f"{method}, {objects} objects", **look)
     ax.set(xlabel="box sizes off by up to [m]", ylabel="share of layouts all right", ylim=(0, 1.08))
     ax.set_title("random boxes")
@@ -214,7 +214,7 @@ def draw_shares_seen(ax, by_laser):
     """Bars: the share of layouts all right, by what the laser saw and by method."""
     for k, method in enumerate(("literal", "robust")):
         found = [share[method] for share in by_laser.values()]
-        bars = ax.bar(np.arange(2) + 0.4 * k, found, 0.38, color=plot.METHODS[method], label=method)
+        bars = ax.bar(np.arange(2) + 0.4 * k, found, 0.38, color=drawing.METHODS[method], label=method)
         ax.bar_label(bars, fmt="%.2f")
     ax.set_xticks(np.arange(2) + 0.2, by_laser)
     ax.set_title("boxes as the laser sees them")

@@ -6,7 +6,7 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from dollop import plot
-from dollop.replication import baseline, recordings
+from dollop.replication import baseline, drawing, recordings
 from dollop.replication.figures.controls import COLUMNS, CONTROLS, by_kind, draw_runs, numbers
 from dollop.replication.figures.panel import panel
 from dollop.replication.figures.performing import law_numbers
@@ -75,14 +75,14 @@ def draw_shares(ax, method, rows, shift):
     counted = right.itertuples(index=False)
     ends = np.transpose([binomtest(k, n).proportion_ci(method="wilson") for k, n in counted])
     reach = np.maximum([share - ends[0], ends[1] - share], 0)
-    look = {"color": plot.METHODS[method], "marker": marker, "label": f"{method} ({seeds} seeds)"}
+    look = {"color": drawing.METHODS[method], "marker": marker, "label": f"{method} ({seeds} seeds)"}
     ax.errorbar(share.index + shift, share, reach, **look)
 
 
 def draw_errors(ax, method, rows):
     """Mean error of the subgoals, where their number is right."""
     error = rows.groupby("n").error.mean().dropna()
-    ax.plot(error.index, error, color=plot.METHODS[method], marker=LINES[method][1], label=method)
+    ax.plot(error.index, error, color=drawing.METHODS[method], marker=LINES[method][1], label=method)
 
 
 def measured(table):
@@ -127,7 +127,7 @@ def draw_demonstration(k):
     plot.law(ax, shown.law.response(), linewidth=4, alpha=0.6)
     plot.path(ax, walk, "user's track", linewidth=1)
     plot.subgoals(ax, shown.law.subgoals)
-    plot.legend_below(figure, ax)
+    drawing.legend_below(figure, ax)
     return figure, law_numbers(shown.law, [walk])
 
 
@@ -147,7 +147,7 @@ def figure_12a():
         label = f"subgoals of demonstration {k + 1}"
         ax.plot(*sequence.T, marker, color=plot.USER, markersize=4, zorder=6, label=label)
     plot.cdhmm(ax, task.model)
-    plot.legend_below(figure, ax, columns=3)
+    drawing.legend_below(figure, ax, columns=3)
     return figure, {
         "states_before": sum(len(sequence) for sequence in task.model.sequences),
         "states_after": len(task.model.means),
@@ -175,7 +175,7 @@ def figure_12b():
         plot.subgoals(ax, task.law.subgoals)
         ax.set(xlim=(0.6, 8.4), ylim=(2.2, 4.8))
     axes[0].set_xlabel("")
-    plot.legend_below(figure, *axes)
+    drawing.legend_below(figure, *axes)
     return figure, numbers(runs_of) | {
         "own_passed_on_the_demonstrated_side": passed_rightly(runs_of["own"]),
         "largest_corner_deg": np.degrees(recordings.largest_corner(task.law)),

@@ -9,7 +9,7 @@ from dollop import lab, plot
 from dollop.foreground import ForegroundGrid, endpoints, foreground_mask
 from dollop.lab.truth import track_error
 from dollop.observation import STATIC_EVERY, foreground_hits, static_boxes
-from dollop.replication import recordings
+from dollop.replication import drawing, recordings
 from dollop.replication.figures.panel import panel
 
 __all__ = []
@@ -24,7 +24,7 @@ def figure_1():
     A Pioneer 2 DX with its real dimensions: two driven wheels, a castor, and the SICK on top. The
     paper has a photograph; this is the model that the simulation drives.
     """
-    return plot.picture(lab.render_robot()), {}
+    return drawing.picture(lab.render_robot()), {}
 
 
 @panel("2")
@@ -108,7 +108,7 @@ def figure_3():
     plot.scan(ax, log, i)
     plot.robot(ax, log.poses[i], label="robot")
     plot.plane(ax)
-    plot.legend_below(figure, ax)
+    drawing.legend_below(figure, ax)
     return figure, {"beams": len(log.angles), "returns": int(np.isfinite(log.ranges[i]).sum())}
 
 
@@ -208,7 +208,7 @@ def figure_5():
 
     Two trash cans about four metres apart among desks and stools; the robot watches from the wall.
     """
-    return plot.picture(lab.render_lab(recordings.figure_eights().scene)), {}
+    return drawing.picture(lab.render_lab(recordings.figure_eights().scene)), {}
 
 
 SIZE = (6, 5.2)
@@ -227,7 +227,7 @@ def figure_6a():
     figure, ax = plt.subplots(figsize=SIZE)
     plot.workspace(recordings.background_map(), sensor, observation.environment.boxes, ax)
     plot.track(ax, user, "user's track", linewidth=0.8)
-    plot.legend_below(figure, ax)
+    drawing.legend_below(figure, ax)
     bias, errors = track_error(user, recording.truth, sensor)
     return figure, {
         "track_error_mean_m": errors.mean(),

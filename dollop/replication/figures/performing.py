@@ -5,7 +5,7 @@ import numpy as np
 
 from dollop import plot
 from dollop.pose import wrapped
-from dollop.replication import recordings
+from dollop.replication import drawing, recordings
 from dollop.replication.figures.controls import COLUMNS, CONTROLS, by_kind, draw_runs, numbers
 from dollop.replication.figures.panel import panel
 from dollop.replication.runs import distances_to_law, return_times
@@ -34,7 +34,7 @@ def figure_6b():
         plot.path(ax, lap, "laps" if k == 0 else None, linewidth=0.4, alpha=0.6)
     plot.law(ax, law.response())
     plot.subgoals(ax, law.subgoals)
-    plot.legend_below(figure, ax)
+    drawing.legend_below(figure, ax)
     return figure, {
         **law_numbers(law, laps),
         "mean_error_laps_m": np.mean([law.error(lap) for lap in laps]),
@@ -79,7 +79,7 @@ def draw_both(work):
     figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
     for ax, (kind, (title, _)) in zip(axes, CONTROLS.items(), strict=True):
         draw_runs(ax, task, runs_of[kind], title)
-    plot.legend_below(figure, *axes)
+    drawing.legend_below(figure, *axes)
     return figure, runs_of
 
 
