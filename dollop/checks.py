@@ -2,7 +2,7 @@
 
 import numpy as np
 
-__all__ = ["check_choice", "check_positive", "checked_array", "checked_positions"]
+__all__ = ["check_choice", "check_positive", "checked_array", "checked_positions", "put_in"]
 
 FARTHEST = 1e9
 """m from the origin: coordinates beyond are no metres, and their squares would overflow."""
@@ -115,3 +115,19 @@ def checked_positions(name, values):
         rule = f"must lie within {FARTHEST:g} m of the origin"
         raise ValueError(f"{name} {rule}, got {farthest:g} m")
     return positions
+
+
+def put_in(record, **fields):
+    """Give a frozen record the values that were checked, its arrays read-only.
+
+    Parameters
+    ----------
+    record : object
+        A frozen dataclass that is being made: to be called in its `__post_init__`.
+    **fields : object
+        Values by the names of its fields; arrays must be its own.
+    """
+    for name, value in fields.items():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+        object.__setattr__(record, name, value)

@@ -2,22 +2,16 @@
 
 from importlib.util import find_spec
 
+from dollop.checks import check_choice
+
 __all__ = ["EXTRAS", "need"]
 
-EXTRAS = {
-    "lab": "pybullet",
-    "ros": "rosbags",
-    "notebooks": "jupyterlab",
-    "baseline": "hmmlearn",
-    "book": "sphinx",
-    "cluster": "distributed",
-    "dev": "pytest",
-}
-"""The module by which each extra of pyproject.toml is known to be there."""
+EXTRAS = {"lab": "pybullet", "ros": "rosbags", "baseline": "hmmlearn", "cluster": "distributed"}
+"""The module by which each extra is known to be there; those of pyproject.toml that the code needs."""
 
 
 def need(extra):
-    """Raise ImportError, with the line that installs it, if an extra is missing; to be asked before the work begins.
+    """Refuse to begin where an extra is missing, with the line that installs it.
 
     Parameters
     ----------
@@ -35,10 +29,9 @@ def need(extra):
     --------
     >>> need("laboratory")
     Traceback (most recent call last):
-    ValueError: no extra 'laboratory'; known: lab, ros, notebooks, baseline, book, cluster, dev
+    ValueError: extra must be one of 'lab', 'ros', 'baseline', 'cluster', got 'laboratory'
     """
-    if extra not in EXTRAS:
-        raise ValueError(f"no extra {extra!r}; known: {', '.join(EXTRAS)}")
+    check_choice("extra", extra, EXTRAS)
     if find_spec(EXTRAS[extra]) is None:
         wheels = " (wheels only for Linux x86-64 and CPython up to 3.11)" if extra == "lab" else ""
         raise ImportError(f'this needs {EXTRAS[extra]}: pip install "dollop[{extra}]"{wheels}')

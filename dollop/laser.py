@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dollop.checks import check_positive, checked_array
+from dollop.checks import check_positive, checked_array, put_in
 from dollop.pose import wrapped
 
 __all__ = ["LaserLog"]
@@ -54,14 +54,12 @@ class LaserLog:
         ranges = checked_array("ranges", self.ranges, t.size, angles.size, finite=False)
         poses = checked_array("poses", self.poses, t.size, 3)
         poses[:, 2] = wrapped(poses[:, 2])
-        for name, array in (("t", t), ("ranges", ranges), ("angles", angles), ("poses", poses)):
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
-        object.__setattr__(self, "max_range", float(self.max_range))
+        max_range = float(self.max_range)
         _check_increasing("t", t)
         _check_increasing("angles", angles)
-        check_positive("max_range", self.max_range)
-        _check_ranges(ranges, self.max_range)
+        check_positive("max_range", max_range)
+        _check_ranges(ranges, max_range)
+        put_in(self, t=t, ranges=ranges, angles=angles, poses=poses, max_range=max_range)
 
     def __len__(self):
         return len(self.t)
@@ -85,6 +83,6 @@ def _check_increasing(name, values):
     """Each value must be greater than the one before."""
     falls = np.flatnonzero(np.diff(values) <= 0)
     if falls.size:
-        i = falls[0]
-        before, after = values[i], values[i + 1]
-        raise ValueError(f"{name} must increase, got {before} and then {after} at index {i + 1}")
+        before, after = values[falls[0] : falls[0] + 2]
+        place = f"at index {falls[0] + 1}"
+        raise ValueError(f"{name} must increase, got {before} and then {after} {place}")

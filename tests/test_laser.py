@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from dollop.checks import check_positive
 from dollop.laser import LaserLog
 
 GOOD = {
@@ -69,15 +68,3 @@ def test_bad_values_are_named(name, value, message):
     """What does not fit is refused with the value and the rule."""
     with pytest.raises(ValueError, match=message):
         LaserLog(**(GOOD | {name: value}))
-
-
-@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf, -np.inf])
-def test_numbers_out_of_range_are_named(value):
-    """The error names the value and the rule; zero passes where it may."""
-    with pytest.raises(ValueError, match=f"side must be positive and finite, got {value}"):
-        check_positive("side", value)
-    with pytest.raises(ValueError, match=f"side must be finite and not negative, got {value}"):
-        check_positive("side", value, or_zero=True)
-    with pytest.raises(ValueError, match="side must be positive and finite, got 0"):
-        check_positive("side", 0)
-    check_positive("side", 0, or_zero=True)
