@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from dollop.checks import check_positive
+from dollop.checks import check_positive, checked_array, put_in
 from dollop.formats import carmen_map
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.formats.files import FormatError
+from dollop.formats.files import FormatError, from_file
 
 __all__ = ["OccupancyGrid", "check_is_map", "covered_cells", "flat_cells", "in_cells", "in_metres"]
 
@@ -51,23 +51,21 @@ class OccupancyGrid:
     resolution: float
 
     def __post_init__(self):
-        object.__setattr__(self, "occupancy", np.array(self.occupancy, dtype=float))
-        object.__setattr__(self, "origin", tuple(float(value) for value in self.origin))
-        object.__setattr__(self, "resolution", float(self.resolution))
-        if self.occupancy.ndim != 2 or self.occupancy.size == 0:
-            raise ValueError(f"occupancy must be a grid of (H, W) cells, got shape {self.occupancy.shape}")
-        wrong = (self.occupancy < 0) | (self.occupancy > 1)
+        cells = checked_array("occupancy", self.occupancy, "H", "W", finite=False)
+        if cells.size == 0:
+            raise ValueError(f"occupancy must hold a cell, got shape {cells.shape}")
+        wrong = (cells < 0) | (cells > 1)
         if wrong.any():
-            raise ValueError(f"an occupancy must be in [0, 1], or NaN where unknown, got {self.occupancy[wrong][0]}")
-        check_positive("resolution", self.resolution)
-        if len(self.origin) != 2 or not np.isfinite(self.origin).all():
-            raise ValueError(f"origin must be a finite x, y, got {self.origin}")
-        self.occupancy.flags.writeable = False
+            rule = "an occupancy must be in [0, 1], or NaN where unknown"
+            raise ValueError(f"{rule}, got {cells[wrong][0]}")
+        origin = tuple(checked_array("origin", self.origin, 2).tolist())
+        check_positive("resolution", float(self.resolution))
+        put_in(self, occupancy=cells, origin=origin, resolution=float(self.resolution))
 
     def __repr__(self):
         height, width = self.occupancy.shape
-        share = self.occupied.mean()
-        return f"OccupancyGrid of {width} x {height} cells of {self.resolution:g} m, {share:.0%} occupied"
+        size = f"{width} x {height} cells of {self.resolution:g} m"
+        return f"OccupancyGrid of {size}, {self.occupied.mean():.0%} occupied"
 
     @classmethod
     def from_log(cls, log, resolution=0.05, max_range=20.0):
@@ -103,16 +101,20 @@ class OccupancyGrid:
         check_positive("resolution", resolution)
         check_positive("max_range", max_range)
         reach = np.minimum(log.ranges, min(max_range, log.max_range))
-        origin, shape = _frame(log, reach, resolution)
-        hits, passes = np.zeros(np.prod(shape)), np.zeros(np.prod(shape))
-        for scans in np.array_split(np.arange(len(log)), 1 + len(log) * log.angles.size // 10_000):
-            ends, samples = _beam_samples(log, scans, reach[scans], log.ranges[scans] <= max_range, resolution)
-            for count, points in ((hits, ends), (passes, samples)):
-                cells, _ = flat_cells(points, origin, resolution, shape)
-                count += np.bincount(cells, minlength=count.size)
+        bearings = log.poses[:, 2, None] + log.angles
+        directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+        ends = log.poses[:, None, :2] + reach[..., None] * directions
+        frame = _frame(np.vstack([*ends, log.poses[:, :2]]), resolution)
+        is_hit = log.ranges <= max_range
+        # A cell's diagonal before its hit a beam has left no trace yet in the cell that it hits.
+        steps = (reach / resolution - np.sqrt(2) * is_hit).astype(int).clip(0)
+        some = np.array_split(np.arange(len(log)), 1 + steps.size // 10_000)
+        passed = (_passed(log, scans, directions, steps, resolution) for scans in some)
+        passes = sum(_counts(points, *frame) for points in passed)
+        hits = _counts(ends[is_hit], *frame)
         seen = hits + passes
-        occupancy = np.divide(hits, seen, out=np.full(hits.size, np.nan), where=seen > 0)
-        return cls(occupancy.reshape(shape), origin, resolution)
+        occupancy = np.divide(hits, seen, out=np.full(seen.shape, np.nan), where=seen > 0)
+        return cls(occupancy, *frame[:2])
 
     @classmethod
     def load(cls, path):
@@ -132,12 +134,7 @@ class OccupancyGrid:
         FormatError
             If the file is not what its name says.
         """
-        path = Path(path)
-        content = _format_of(path).read_map(path)
-        try:
-            return cls(*content)
-        except ValueError as error:
-            raise FormatError(str(error), path) from None
+        return from_file(path, cls, *_format_of(path).read_map(path))
 
     def save(self, path):
         """Write a ROS map_server map (`.yaml`, and beside it a `.pgm` of the same name) or a CARMEN map (`.map`).
@@ -149,7 +146,6 @@ class OccupancyGrid:
         path : str or Path
             The file; it appears whole or not at all, and the picture with it.
         """
-        path = Path(path)
         _format_of(path).write_map(path, self.occupancy, self.origin, self.resolution)
 
     @property
@@ -171,8 +167,8 @@ class OccupancyGrid:
     def extent(self):
         """xmin, xmax, ymin, ymax in m, as matplotlib's `imshow` takes them (with `origin="lower"`)."""
         height, width = self.occupancy.shape
-        (x, y), side = self.origin, self.resolution
-        return x, x + width * side, y, y + height * side
+        right, top = in_metres(width, height, self.origin, self.resolution)
+        return self.origin[0], right, self.origin[1], top
 
     def world_to_cell(self, points):
         """Cells that hold the points, on the map or off it.
@@ -235,11 +231,9 @@ class OccupancyGrid:
 
     @cached_property
     def _distances(self):
-        if self.occupied.any():
-            nearest = scipy.ndimage.distance_transform_edt
-            distances = nearest(~self.occupied, sampling=self.resolution)
-        else:
-            distances = np.full(self.occupancy.shape, np.inf)
+        distances = scipy.ndimage.distance_transform_edt(~self.occupied, sampling=self.resolution)
+        if not self.occupied.any():
+            distances[:] = np.inf
         distances.flags.writeable = False
         return distances
 
@@ -273,41 +267,39 @@ def check_is_map(path):
 def _format_of(path):
     """The module that reads and writes maps of this name."""
     check_is_map(path)
-    if path.suffix == ".map":
+    if Path(path).suffix == ".map":
         return carmen_map
     from dollop.formats import ros_map  # only now: PyYAML and Pillow take long to load
 
     return ros_map
 
 
-def _frame(log, reach, resolution):
-    """Corner and shape of a grid that holds the sensor and the ends of all beams, with a cell to spare."""
-    bearings = log.poses[:, 2, None] + log.angles
-    x = log.poses[:, 0, None] + reach * np.cos(bearings)
-    y = log.poses[:, 1, None] + reach * np.sin(bearings)
-    ends = np.vstack([np.column_stack([x.ravel(), y.ravel()]), log.poses[:, :2]])
-    left, low = np.floor(ends.min(axis=0) / resolution) - 1
-    right, high = np.floor(ends.max(axis=0) / resolution) + 2
+def _frame(points, resolution):
+    """Corner, resolution and shape of a grid that holds the points (M, 2), with a cell to spare."""
+    left, low = np.floor(points.min(axis=0) / resolution) - 1
+    right, high = np.floor(points.max(axis=0) / resolution) + 2
     if (right - left) * (high - low) > MAX_CELLS:
-        raise ValueError(f"{right - left:.0f} x {high - low:.0f} cells of {resolution} m are more than {MAX_CELLS}")
-    return (left * resolution, low * resolution), (int(high - low), int(right - left))
+        cells = f"{right - left:.0f} x {high - low:.0f} cells of {resolution} m"
+        raise ValueError(f"{cells} are more than {MAX_CELLS}")
+    return (left * resolution, low * resolution), resolution, (int(high - low), int(right - left))
 
 
-def _beam_samples(log, scans, reach, is_hit, resolution):
-    """Ends of the beams that hit something, and points one cell apart along all beams, up to a cell before the end."""
-    bearings = log.poses[scans, 2, None] + log.angles
-    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
-    starts = np.broadcast_to(log.poses[scans, None, :2], directions.shape)
-    ends = (starts + reach[..., None] * directions)[is_hit]
-    # A cell's diagonal before its hit a beam has left no trace yet in the cell that it hits.
-    counts = np.maximum((reach / resolution - np.sqrt(2) * is_hit).astype(int), 0).ravel()
-    along = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    # A laser that stands still must not step over the same corners in every scan: the golden ratio spreads the phases.
-    phases = np.repeat(scans * ((np.sqrt(5) - 1) / 2) % 1, log.angles.size)
-    along = along + np.repeat(phases, counts)
-    samples = np.repeat(starts.reshape(-1, 2), counts, axis=0)
-    samples += np.repeat(directions.reshape(-1, 2), counts, axis=0) * (along * resolution)[:, None]
-    return ends, samples
+def _counts(points, origin, resolution, shape):
+    """How many points (M, 2) lie in each cell of a grid, (H, W)."""
+    cells, _ = flat_cells(points, origin, resolution, shape)
+    return np.bincount(cells, minlength=shape[0] * shape[1]).reshape(shape)
+
+
+def _passed(log, scans, directions, steps, resolution):
+    """Points a cell apart along the beams of some scans, as many as there are `steps` (T, B)."""
+    steps = steps[scans]
+    along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps.ravel(), steps.ravel())
+    # A laser that stands still must not step over the same corners in every scan: the golden ratio
+    # spreads the phases.
+    along = along + np.repeat(scans * ((np.sqrt(5) - 1) / 2) % 1, steps.sum(axis=1))
+    starts = np.repeat(log.poses[scans, :2], steps.sum(axis=1), axis=0)
+    ways = np.repeat(directions[scans].reshape(-1, 2), steps.ravel(), axis=0)
+    return starts + ways * (along * resolution)[:, None]
 
 
 def in_cells(x, y, origin, resolution):
@@ -399,9 +391,10 @@ def covered_cells(boxes, origin, resolution, shape):
     (H, W) bool array
     """
     covered = np.zeros(shape, dtype=bool)
-    columns, rows = in_cells(boxes[:, ::2].T, boxes[:, 1::2].T, origin, resolution)
-    low = np.floor(np.stack([columns[0], rows[0]], axis=1) + 1e-9).astype(int).clip(0)
-    high = np.ceil(np.stack([columns[1], rows[1]], axis=1) - 1e-9).astype(int).clip(0)
-    for (left, bottom), (right, top) in zip(low, high, strict=True):
+    corners = np.reshape(boxes, (-1, 2, 2)).T
+    low, high = np.moveaxis(in_cells(*corners, origin, resolution), 1, 0)
+    low = np.floor(low + 1e-9).astype(int).clip(0)
+    high = np.ceil(high - 1e-9).astype(int).clip(0)
+    for left, bottom, right, top in zip(*low, *high, strict=True):
         covered[bottom:top, left:right] = True
     return covered

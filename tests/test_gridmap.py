@@ -161,14 +161,14 @@ def test_cells_and_points():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"occupancy": np.zeros(3)}, r"must be a grid of \(H, W\) cells, got shape \(3,\)"),
-        ({"occupancy": np.zeros((0, 3))}, r"got shape \(0, 3\)"),
+        ({"occupancy": np.zeros(3)}, r"occupancy must have shape \(H, W\), got \(3,\)"),
+        ({"occupancy": np.zeros((0, 3))}, r"occupancy must hold a cell, got shape \(0, 3\)"),
         ({"occupancy": [[0.0, 1.5]]}, r"must be in \[0, 1\].*got 1.5"),
         ({"occupancy": [[0.0, -1.0]]}, r"must be in \[0, 1\].*got -1.0"),
         ({"resolution": 0.0}, "resolution must be positive and finite, got 0.0"),
         ({"resolution": np.nan}, "resolution must be positive and finite, got nan"),
-        ({"origin": (0.0, np.inf)}, "origin must be a finite x, y"),
-        ({"origin": (0.0, 0.0, 0.0)}, "origin must be a finite x, y"),
+        ({"origin": (0.0, np.inf)}, "origin must be finite, got inf"),
+        ({"origin": (0.0, 0.0, 0.0)}, r"origin must have shape \(2,\), got \(3,\)"),
     ],
 )
 def test_bad_values_are_named(change, message):

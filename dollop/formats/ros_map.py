@@ -38,7 +38,7 @@ def write_map(path, occupancy, origin, resolution):
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         The YAML.
     occupancy : (H, W) float array
         Probabilities, NaN where unknown; row 0 has the lowest y.
@@ -47,14 +47,14 @@ def write_map(path, occupancy, origin, resolution):
     resolution : float
         Side of a cell in m.
     """
-    image = path.with_suffix(".pgm")
+    image = os.path.splitext(path)[0] + ".pgm"
     grey, (low, high) = np.rint(255 * (1 - occupancy)), UNKNOWN_GREY
     occupied, free = occupancy >= OCCUPIED_FROM, occupancy < OCCUPIED_FROM
     sides = np.minimum(grey, low - 1), np.maximum(grey, high + 1)
     grey = np.select([occupied, free], sides, low).astype(np.uint8)
     place = {"resolution": float(resolution), "origin": [*map(float, origin), 0.0]}
     meaning = {"negate": 0, "occupied_thresh": 0.505, "free_thresh": 0.495}
-    keys = {"image": image.name, "mode": "trinary", **place, **meaning}
+    keys = {"image": os.path.basename(image), "mode": "trinary", **place, **meaning}
     layout = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True}
     with whole_file(path) as stream, whole_file(image) as picture:
         stream.write(yaml.safe_dump(keys, **layout).encode())
@@ -67,7 +67,7 @@ def read_map(path):
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         The YAML; its picture may be any that Pillow reads, such as PGM and PNG.
 
     Returns
@@ -119,19 +119,19 @@ def _read_grey(path, name):
     """Grey values (H, W) from 0 to 255 of the picture beside a map, of a coloured one the mean as
     in map_server.
     """
-    # os.path and not pathlib, which lets names that are too long or hold a zero byte through as
-    # other errors.
-    if not os.path.isfile(path.parent / name):
+    # os.path and not pathlib, for which a name too long or with a zero byte is another error.
+    place = os.path.join(os.path.dirname(path), name)
+    if not os.path.isfile(place):
         raise FormatError(f"its picture {name!r} is missing", path)
     try:
-        with Image.open(path.parent / name) as picture:
+        with Image.open(place) as picture:
             if picture.mode.startswith("I"):  # sixteen bits
                 return np.asarray(picture) / 257
             colours = np.asarray(picture.convert("RGBA"), float)
-    except Exception as error:  # Pillow meets a broken picture with whatever its parsers happen to raise
-        raise FormatError(f"not a readable picture ({error})", path.parent / name) from None
+    except Exception as error:  # whatever Pillow's parsers happen to raise
+        raise FormatError(f"not a readable picture ({error})", place) from None
     if (colours[..., 3] < 255).any():
-        raise FormatError("a map must have no transparent pixels", path.parent / name)
+        raise FormatError("a map must have no transparent pixels", place)
     return colours[..., :3].mean(axis=2)
 
 
