@@ -25,7 +25,7 @@ from dollop.environment import Environment
 from dollop.matching import Matching, match_confidently
 from dollop.pose import rotation, wrapped
 
-__all__ = ["Association", "FrameAssociation", "Frames", "associate", "associate_with_frames", "layout_turn"]
+__all__ = ["Association", "FrameAssociation", "Frames", "associate", "associate_with_frames"]
 
 _EPSILON = 0.05**2  # m²: corners are not known better than to a cell of the foreground grid
 
@@ -79,22 +79,19 @@ class Association:
             Where the environments cannot be matched with confidence, where a given matching belongs to others, or
             where it leaves out all corners of a subgoal.
         """
-        indices = self._indices(environment, matching)
-        partners = indices[self.corners]
-        weights = self.weights * (partners >= 0)
+        indices, corners, weights = self._ties(environment, matching)
         totals = weights.sum(axis=1, keepdims=True)
-        if (totals == 0).any():
-            number = np.flatnonzero(totals == 0)[0]
-            raise ValueError(
-                f"a subgoal needs one matched corner at least, but the matching leaves out all of subgoal {number}: "
-                f"corners {self.corners[number].tolist()}"
-            )
+        lost = np.flatnonzero(totals == 0)
+        if len(lost):
+            gone = f"all of subgoal {lost[0]}: corners {self.corners[lost[0]].tolist()}"
+            raise ValueError(f"a subgoal needs a matched corner, the matching leaves out {gone}")
         differences = self.differences
         if turned:
             matched = indices >= 0
-            turn = layout_turn(self.environment.corners[matched], environment.corners[indices[matched]])
-            differences = differences @ rotation(turn).T
-        return np.einsum("km,kmd->kd", weights / totals, environment.corners[partners] + differences)
+            before, now = self.environment.corners[matched], environment.corners[indices[matched]]
+            differences = differences @ rotation(layout_turn(before, now)).T
+        moved = environment.corners[corners] + differences
+        return np.einsum("km,kmd->kd", weights / totals, moved)
 
     def carried(self, environment, matching=None):
         """The same ties with the objects where they stand now: parameters as for `relocate`.
@@ -102,21 +99,22 @@ class Association:
         Relocating from it goes on from the demonstrated differences, so that moving objects there and back moves
         nothing. Ties to objects that are gone are cut.
         """
-        partners = self._indices(environment, matching)[self.corners]
-        return Association(environment, np.maximum(partners, 0), self.weights * (partners >= 0), self.differences)
+        _, corners, weights = self._ties(environment, matching)
+        return Association(environment, corners, weights, self.differences)
 
-    def _indices(self, environment, matching):
-        n, m = len(self.environment.corners), len(environment.corners)
+    def _ties(self, environment, matching):
+        """Where all corners go (4N,), where those of each subgoal go (K, m), and their weights."""
+        names = "the associated environment", "the new one"
         if matching is None and np.array_equal(self.environment.boxes, environment.boxes):
             matching = Matching.identity(len(environment))
-        elif matching is None:
-            matching = match_confidently(self.environment, environment, ("the associated environment", "the new one"))
-        if len(matching.indices) != n or matching.indices.max(initial=-1) >= m:
-            raise ValueError(
-                f"the matching must go from the {n} associated corners to the {m} present ones, "
-                f"got {len(matching.indices)} indices up to {matching.indices.max(initial=-1)}"
-            )
-        return matching.indices
+        matching = matching or match_confidently(self.environment, environment, names)
+        n, m, indices = len(self.environment.corners), len(environment.corners), matching.indices
+        highest = indices.max(initial=-1)
+        if len(indices) != n or highest >= m:
+            rule = f"from the {n} associated corners to the {m} present ones"
+            raise ValueError(f"the matching must go {rule}, got {len(indices)} indices up to {highest}")
+        partners = indices[self.corners]
+        return indices, np.maximum(partners, 0), self.weights * (partners >= 0)
 
 
 def associate(subgoals, environment, m=4):
@@ -152,15 +150,17 @@ def associate(subgoals, environment, m=4):
     subgoals = checked_positions("subgoals", subgoals)
     corners = environment.corners
     if len(corners) == 0:
-        raise ValueError("subgoals can only be associated with an environment of at least 1 object, got 0")
+        raise ValueError("subgoals need an environment of at least 1 object, got 0")
     if m not in range(1, len(corners) + 1):
-        raise ValueError(f"m must be a whole number between 1 and the number of corners {len(corners)}, got {m}")
+        rule = f"a whole number between 1 and the number of corners {len(corners)}"
+        raise ValueError(f"m must be {rule}, got {m}")
     differences = subgoals[:, None] - corners
     squares = (differences**2).sum(axis=2)
     nearest = np.argsort(squares, axis=1, kind="stable")[:, :m]
-    weights = 1 / (np.take_along_axis(squares, nearest, axis=1) + _EPSILON)
+    each = np.arange(len(subgoals))[:, None]
+    weights = 1 / (squares[each, nearest] + _EPSILON)
     weights /= weights.sum(axis=1, keepdims=True)
-    return Association(environment, nearest, weights, np.take_along_axis(differences, nearest[..., None], axis=1))
+    return Association(environment, nearest, weights, differences[each, nearest])
 
 
 def layout_turn(corners_i, corners_j):
@@ -276,14 +276,12 @@ def associate_with_frames(subgoals, frames):
     True
     """
     subgoals = checked_array("subgoals", subgoals, "D", "K", 2)
-    if not len(subgoals):
-        raise ValueError("subgoals must be of one demonstration at least, got none")
     counts = [len(f) for f in frames]
     if len(counts) != len(subgoals) or len(set(counts)) != 1 or counts[0] == 0:
-        raise ValueError(
-            f"each of {len(subgoals)} demonstrations needs the same frames, at least 1, got counts {counts}"
-        )
-    local = np.stack([_seen_from(f, s) for f, s in zip(frames, subgoals, strict=True)])
+        rule = "one demonstration at least, and for each the same frames, at least 1, are needed"
+        raise ValueError(f"{rule}, got {len(subgoals)} demonstrations and frames {counts}")
+    pairs = zip(subgoals, frames, strict=True)
+    local = np.stack([(s - f.positions[:, None]) @ rotation(f.directions) for s, f in pairs])
     weights = 1 / ((local**2).sum(axis=3).mean(axis=0) + _EPSILON) / _variances(local)
     return FrameAssociation(local.mean(axis=0), weights / weights.sum(axis=0))
 
@@ -295,8 +293,3 @@ def _variances(local):
     # Less variance than corners are known to tells nothing: it may be mere rounding.
     usual = squares.mean() / max(len(local) - 1, 1)
     return squares + max(usual, _EPSILON)
-
-
-def _seen_from(frames, positions):
-    """(M, K, 2): positions (K, 2) in the coordinates of each frame."""
-    return (positions - frames.positions[:, None]) @ rotation(frames.directions)

@@ -50,7 +50,13 @@ class Environment:
     boxes: np.ndarray
 
     def __post_init__(self):
-        object.__setattr__(self, "boxes", _checked_boxes(self.boxes))
+        boxes = checked_array("boxes", self.boxes if np.size(self.boxes) else np.empty((0, 4)), "N", 4)
+        negative = np.flatnonzero((boxes[:, 2:] < boxes[:, :2]).any(axis=1))
+        if len(negative):
+            found = f"{boxes[negative[0]].tolist()} for object {negative[0]}"
+            raise ValueError(f"a box must have xmin <= xmax and ymin <= ymax, got {found}")
+        boxes.flags.writeable = False
+        object.__setattr__(self, "boxes", boxes)
 
     def __len__(self):
         return len(self.boxes)
@@ -73,21 +79,7 @@ class Environment:
     def __repr__(self):
         places = ", ".join(f"({x:.2f}, {y:.2f})" for x, y in self.centres[:6])
         more = f", ... {len(self) - 6} more" if len(self) > 6 else ""
-        return f"Environment of {len(self)} objects round {places}{more}" if len(self) else "Environment of 0 objects"
-
-
-def _checked_boxes(boxes):
-    if np.size(boxes) == 0:
-        boxes = np.empty((0, 4))
-    boxes = checked_array("boxes", boxes, "N", 4)
-    negative = (boxes[:, 2:] < boxes[:, :2]).any(axis=1)
-    if negative.any():
-        number = np.flatnonzero(negative)[0]
-        raise ValueError(
-            f"a box must have xmin <= xmax and ymin <= ymax, got {boxes[number].tolist()} for object {number}"
-        )
-    boxes.flags.writeable = False
-    return boxes
+        return f"Environment of {len(self)} objects" + (f" round {places}{more}" if len(self) else "")
 
 
 def corner_indices(partners, turn=0.0):
@@ -144,7 +136,7 @@ def spring_constants(corners):
     >>> spring_constants([[0, 0], [1, 0], [2, 0]])[0].tolist()
     [0.0, 1.0, 0.25]
     """
-    return _springs(_differences(corners))
+    return _springs(corners)[0]
 
 
 def spring_forces(corners):
@@ -172,8 +164,7 @@ def spring_forces(corners):
     >>> bool(np.allclose(spring_forces([[0, 0], [1, 0], [3, 1]]).sum(axis=0), 0))
     True
     """
-    differences = _differences(corners)
-    springs = _springs(differences)
+    springs, differences = _springs(corners)
     # k_mn / ||omega_n - omega_m|| = k_mn^(3/2)
     return np.matmul((springs * np.sqrt(springs))[:, None], differences)[:, 0]
 
@@ -202,15 +193,13 @@ def integer_costs(corners_i, corners_j, alpha=1e3):
     return np.ceil(alpha * changes - _ROUNDING).astype(np.int64)
 
 
-def _differences(corners):
+def _springs(corners):
+    """Spring constants (C, C) and differences omega_n - omega_m (C, C, 2) between corners."""
     corners = np.asarray(corners, dtype=float)
-    return corners - corners[:, None]
-
-
-def _springs(differences):
+    differences = corners - corners[:, None]
     squares = np.einsum("mnd,mnd->mn", differences, differences)
     np.fill_diagonal(squares, np.inf)
     if squares.min(initial=np.inf) == 0:
         first, second = np.argwhere(squares == 0)[0]
-        raise ValueError(f"corners must not coincide (their spring is infinite), but {first} and {second} do")
-    return 1 / squares
+        raise ValueError(f"corners {first} and {second} must not coincide: infinite spring")
+    return 1 / squares, differences

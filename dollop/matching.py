@@ -20,8 +20,8 @@ staying in place counts, by L_shift at most.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations, permutations
-from math import comb, factorial, pi
+from itertools import combinations, permutations, product
+from math import comb, perm, pi
 
 import numpy as np
 import scipy
@@ -29,7 +29,7 @@ import scipy
 from dollop.checks import check_choice, check_positive
 from dollop.environment import corner_indices, integer_costs
 
-__all__ = ["Matching", "match", "match_confidently", "second_best"]
+__all__ = ["Matching", "match", "match_confidently"]
 
 _KAPPA = 1.0  # of a layout that was turned, small turns are a little likelier
 _TURNED = 4.0  # L_turn, nats
@@ -133,17 +133,19 @@ def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4
     check_choice("method", method, ("robust", "literal"))
     check_positive("left_out", left_out)
     check_positive("moved", moved)
+    counts = f"{len(environment_i)} and {len(environment_j)}"
     if min(len(environment_i), len(environment_j)) < 2:
-        raise ValueError(
-            f"matching compares layouts: each environment needs at least 2 objects, "
-            f"got {len(environment_i)} and {len(environment_j)}"
-        )
+        rule = "each environment needs at least 2 objects"
+        raise ValueError(f"matching compares layouts: {rule}, got {counts}")
+    if method == "literal" and len(environment_i) != len(environment_j):
+        rule = "is a bijection and needs the same number of objects"
+        raise ValueError(f"the literal method {rule}, got {counts}")
     if method == "literal":
         return _match_literally(environment_i, environment_j)
     return _match_robustly(environment_i, environment_j, left_out, moved)
 
 
-def match_confidently(environment_i, environment_j, names=("the task's environment", "the new one")):
+def match_confidently(environment_i, environment_j, names):
     """The robust matching of two environments, if it is sure; of one object in each there is only one.
 
     Raises
@@ -157,21 +159,15 @@ def match_confidently(environment_i, environment_j, names=("the task's environme
     try:
         matching = match(environment_i, environment_j)
     except ValueError as error:
-        raise ValueError(f"{names[0]} and {names[1]}: {error}") from error
+        raise ValueError(f"{' and '.join(names)}: {error}") from error
     if not matching.confident:
-        raise ValueError(
-            f"{names[0]} and {names[1]} cannot be matched with confidence: the second-best matching costs only "
-            f"{matching.margin:.2f} more; give the matching, or move the objects apart"
-        )
+        found = f"the second-best matching costs only {matching.margin:.2f} more"
+        pair, advice = " and ".join(names), "give the matching, or move the objects apart"
+        raise ValueError(f"{pair} cannot be matched with confidence: {found}; {advice}")
     return matching
 
 
 def _match_literally(environment_i, environment_j):
-    if len(environment_i) != len(environment_j):
-        raise ValueError(
-            f"the literal method is a bijection and needs the same number of objects, "
-            f"got {len(environment_i)} and {len(environment_j)}"
-        )
     costs = integer_costs(environment_i.corners, environment_j.corners)
     rows, indices = scipy.optimize.linear_sum_assignment(costs)
     margin = second_best(costs, indices)
@@ -179,26 +175,27 @@ def _match_literally(environment_i, environment_j):
 
 
 def _match_robustly(environment_i, environment_j, left_out, moved):
-    x, y = (environment.centres @ (1, 1j) / moved for environment in (environment_i, environment_j))  # sigma is 1
+    x, y = (each.centres @ (1, 1j) / moved for each in (environment_i, environment_j))  # sigma is 1
     # One object of each left out costs what a move of left_out costs: 2 c = left_out^2 / (2 sigma^2).
     price = (left_out / moved) ** 2 / 4
-    few = _count_partial(len(x), len(y)) <= _ENUMERATED
-    partners, cost, margin, turn = (_enumerate if few else _search)(x, y, price)
-    confident = bool(margin >= np.log(_ODDS))
-    return Matching(corner_indices(partners, turn), float(cost), float(margin), confident, float(turn))
+    ways = sum(comb(len(x), k) * perm(len(y), k) for k in range(len(x) + 1))
+    partners, cost, margin, turn = (_enumerate if ways <= _ENUMERATED else _search)(x, y, price)
+    indices, confident = corner_indices(partners, turn), bool(margin >= np.log(_ODDS))
+    return Matching(indices, float(cost), float(margin), confident, float(turn))
 
 
 def _costs_of(x, y, partners, price):
     """Cost (P,) and turn (P,) of each row of `partners` (P, N), by the formula of the module."""
     matched = partners >= 0
     n = matched.sum(axis=1)
-    (z, mean_z), (w, mean_w) = _centred(x * matched, matched), _centred(y[partners] * matched, matched)
+    z, mean_z = _centred(x * matched, matched)
+    w, mean_w = _centred(y[partners] * matched, matched)
     likeness = (z.conj() * w).sum(axis=1)
     turned = np.abs(likeness + _KAPPA) - _KAPPA - _TURNED
     spread = (np.abs(z) ** 2 + np.abs(w) ** 2).sum(axis=1) / 2
     stays = np.exp(-n * np.abs(mean_w - mean_z) ** 2 / 2)
-    left_out = price * (len(x) + len(y) - 2 * n)
-    costs = spread - np.logaddexp(likeness.real, turned) - np.log(stays + np.exp(-_SHIFTED)) + left_out
+    costs = spread - np.logaddexp(likeness.real, turned) - np.log(stays + np.exp(-_SHIFTED))
+    costs += price * (len(x) + len(y) - 2 * n)
     return costs + _UNMOVED, np.where(likeness.real >= turned, 0.0, np.angle(likeness + _KAPPA))
 
 
@@ -215,20 +212,15 @@ def _enumerate(x, y, price):
     return partners[best], costs[best], costs[second] - costs[best], turns[best]
 
 
-def _count_partial(n, m):
-    return sum(comb(n, k) * comb(m, k) * factorial(k) for k in range(min(n, m) + 1))
-
-
 @lru_cache(maxsize=32)
 def _all_partial(n, m):
     """Every way to match some of n with some of m, (P, n), -1 where left out."""
-    table = [
-        [chosen[rows.index(a)] if a in rows else -1 for a in range(n)]
-        for k in range(min(n, m) + 1)
-        for rows in combinations(range(n), k)
-        for chosen in permutations(range(m), k)
-    ]
-    return np.array(table)
+    found = []
+    for k in range(min(n, m) + 1):
+        for rows, columns in product(combinations(range(n), k), permutations(range(m), k)):
+            found.append(np.full(n, -1))
+            found[-1][list(rows)] = columns
+    return np.array(found)
 
 
 def _search(x, y, price):
@@ -251,15 +243,15 @@ def _alignments(x, y, price):
     anchors, probes = x[central[: max(1, 100 // len(y))]], x[central[:_PROBES]]
     turns = np.repeat(np.arange(-3, 5) * pi / 4, len(anchors) * len(y) + 1)
     # Under a turn either the means coincide, or one of the central objects falls on one of the others.
-    shifts = np.r_[y.mean() - x.mean(), np.subtract.outer(y, anchors).ravel()]
-    pivots = np.r_[x.mean(), np.tile(anchors, len(y))]
-    shifts, pivots = np.tile(shifts, 8), np.tile(pivots, 8)
+    shifts = np.tile(np.r_[y.mean() - x.mean(), np.subtract.outer(y, anchors).ravel()], 8)
+    pivots = np.tile(np.r_[x.mean(), np.tile(anchors, len(y))], 8)
     images = np.exp(1j * turns)[:, None] * (probes - pivots[:, None]) + (pivots + shifts)[:, None]
-    distances, _ = scipy.spatial.cKDTree(np.c_[y.real, y.imag]).query(np.stack([images.real, images.imag], axis=-1))
+    tree = scipy.spatial.cKDTree(np.c_[y.real, y.imag])
+    distances, _ = tree.query(np.stack([images.real, images.imag], axis=-1))
     fits = np.minimum(distances**2 / 2, 2 * price).sum(axis=1)
     chosen = np.argsort(fits, kind="stable")[:_STARTS]
-    in_place = (0.0, 0.0, 0.0)
-    return [in_place, *((turns[k], pivots[k], shifts[k]) for k in chosen)]
+    best = zip(turns[chosen], pivots[chosen], shifts[chosen], strict=True)
+    return [(0.0, 0.0, 0.0), *best]  # in place, and those
 
 
 def _refine(x, y, price, *alignment):
@@ -268,7 +260,7 @@ def _refine(x, y, price, *alignment):
     for _ in range(_REFINEMENTS):
         partners = _assign(_moves(x, y, *alignment), price)
         costs, turns = _costs_of(x, y, partners[None], price)
-        if previous is not None and (partners == previous).all():
+        if np.array_equal(partners, previous):
             break
         previous, alignment = partners, _alignment(x, y, partners, turns[0])
     return partners, costs[0], turns[0]

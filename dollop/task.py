@@ -139,7 +139,9 @@ class Task:
         ValueError
             If the environments cannot be matched with confidence; the margin is named.
         """
-        matching = matching or match_confidently(self.environment, environment)
+        matching = matching or match_confidently(
+            self.environment, environment, ("the task's environment", "the new one")
+        )
         start, *subgoals = self.association.relocate(environment, matching, turned)
         law = self.law.with_subgoals(subgoals, start, turned)
         return replace(

@@ -233,8 +233,10 @@ def test_bad_frames_are_refused():
     with pytest.raises(ValueError, match="subgoals must be finite"):
         associate_with_frames(np.full((1, 1, 2), np.nan), [two])
     for frames in ([two], [two, three], [Frames(np.zeros((0, 2)), [])] * 2):
-        with pytest.raises(ValueError, match="needs the same frames"):
+        with pytest.raises(ValueError, match="the same frames, .* got 2 demonstrations and frames"):
             associate_with_frames(np.zeros((2, 4, 2)), frames)
+    with pytest.raises(ValueError, match=r"one demonstration at least, .* got 0 demonstrations"):
+        associate_with_frames(np.zeros((0, 4, 2)), [])
     with pytest.raises(ValueError, match="must stay 2, got 3"):
         associate_with_frames(np.zeros((2, 4, 2)), [two, two]).relocate(three)
 
