@@ -22,7 +22,7 @@ import numpy as np
 
 from dollop.checks import checked_array, checked_positions
 from dollop.environment import Environment
-from dollop.matching import Matching, match_confidently
+from dollop.matching import match_confidently
 from dollop.pose import rotation, wrapped
 
 __all__ = ["Association", "FrameAssociation", "Frames", "associate", "associate_with_frames"]
@@ -105,8 +105,6 @@ class Association:
     def _ties(self, environment, matching):
         """Where all corners go (4N,), where those of each subgoal go (K, m), and their weights."""
         names = "the associated environment", "the new one"
-        if matching is None and np.array_equal(self.environment.boxes, environment.boxes):
-            matching = Matching.identity(len(environment))
         matching = matching or match_confidently(self.environment, environment, names)
         n, m, indices = len(self.environment.corners), len(environment.corners), matching.indices
         highest = indices.max(initial=-1)

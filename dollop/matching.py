@@ -146,7 +146,9 @@ def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4
 
 
 def match_confidently(environment_i, environment_j, names):
-    """The robust matching of two environments, if it is sure; of one object in each there is only one.
+    """The robust matching of two environments, if it is sure.
+
+    Of one object in each there is only one; and where all boxes are the same, none has moved.
 
     Raises
     ------
@@ -154,8 +156,9 @@ def match_confidently(environment_i, environment_j, names):
         As `match`, and if a second matching is nearly as good: then ask the user, do not guess. `names` say what the
         two are.
     """
-    if len(environment_i) == len(environment_j) == 1:
-        return Matching.identity(1)
+    unmoved = np.array_equal(environment_i.boxes, environment_j.boxes)
+    if unmoved or len(environment_i) == len(environment_j) == 1:
+        return Matching.identity(len(environment_i))
     try:
         matching = match(environment_i, environment_j)
     except ValueError as error:

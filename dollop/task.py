@@ -13,7 +13,7 @@ from dollop.environment import Environment
 from dollop.formats.files import FormatError, read_bytes, whole_file
 from dollop.laps import laps
 from dollop.lds import LDS, Statistics
-from dollop.matching import Matching, match_confidently
+from dollop.matching import match_confidently
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import check_trajectories
 
@@ -309,9 +309,7 @@ def check_laws(demonstrations):
 
 
 def matching_to(environment, demonstration, number):
-    """The matching from demonstration `number` to the environment to learn in; identity where it is the same one."""
-    if np.array_equal(demonstration.environment.boxes, environment.boxes):
-        return Matching.identity(len(environment))
+    """The matching from demonstration `number` to the environment to learn in."""
     return match_confidently(demonstration.environment, environment, (f"demonstration {number}", "the one to learn in"))
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dollop import Demonstration, Environment, FormatError, Task, learn
+from dollop import Demonstration, Environment, FormatError, Task, learn, match
 from dollop.task import anchors, members_along
 
 CANS = np.array([[2.3, 3.4, 2.7, 3.8], [6.3, 3.4, 6.7, 3.8]])
@@ -109,6 +109,14 @@ def test_an_ambiguous_scene_is_reported(task):
     turned = Environment([[4.3, 1.4, 4.7, 1.8], [4.3, 5.4, 4.7, 5.8]])
     with pytest.raises(ValueError, match=r"cannot be matched with confidence: .* costs only 0.00 more"):
         task.adapt(turned)
+
+
+def test_objects_that_stand_where_they_stood_are_the_same():
+    """Two boxes so near together that each could be the other: where none has moved, nothing is in doubt."""
+    near = Environment([[2.3, 3.4, 2.4, 3.5], [2.5, 3.4, 2.6, 3.5]])
+    task = Task.of(Demonstration(eight(), near))
+    assert not match(near, near).confident
+    np.testing.assert_allclose(anchors(task.adapt(near).law), anchors(task.law), atol=1e-12)
 
 
 def test_saved_and_loaded_it_is_the_same_task(task, tmp_path):
