@@ -56,8 +56,7 @@ class OccupancyGrid:
             raise ValueError(f"occupancy must hold a cell, got shape {cells.shape}")
         wrong = (cells < 0) | (cells > 1)
         if wrong.any():
-            rule = "an occupancy must be in [0, 1], or NaN where unknown"
-            raise ValueError(f"{rule}, got {cells[wrong][0]}")
+            raise ValueError(f"occupancy must be in [0, 1] or NaN, got {cells[wrong][0]}")
         origin = tuple(checked_array("origin", self.origin, 2).tolist())
         check_positive("resolution", float(self.resolution))
         put_in(self, occupancy=cells, origin=origin, resolution=float(self.resolution))
@@ -278,10 +277,10 @@ def _frame(points, resolution):
     """Corner, resolution and shape of a grid that holds the points (M, 2), with a cell to spare."""
     left, low = np.floor(points.min(axis=0) / resolution) - 1
     right, high = np.floor(points.max(axis=0) / resolution) + 2
-    if (right - left) * (high - low) > MAX_CELLS:
-        cells = f"{right - left:.0f} x {high - low:.0f} cells of {resolution} m"
-        raise ValueError(f"{cells} are more than {MAX_CELLS}")
-    return (left * resolution, low * resolution), resolution, (int(high - low), int(right - left))
+    columns, rows = int(right - left), int(high - low)
+    if columns * rows > MAX_CELLS:
+        raise ValueError(f"{columns} x {rows} cells of {resolution} m are more than {MAX_CELLS}")
+    return (left * resolution, low * resolution), resolution, (rows, columns)
 
 
 def _counts(points, origin, resolution, shape):
@@ -367,7 +366,7 @@ def flat_cells(points, origin, resolution, shape):
     inside : (M,) bool array
         Which of the points do.
     """
-    column, row = (np.floor(each).astype(np.intp) for each in in_cells(*points.T, origin, resolution))
+    column, row = np.floor(in_cells(*points.T, origin, resolution)).astype(np.intp)
     inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
     return (row * shape[1] + column)[inside], inside
 

@@ -50,9 +50,7 @@ def read_map(path):
     if not head:
         raise FormatError(f"no {MAP_LABEL.decode()} after the comment lines", path)
     body = _gridmap_chunk(path, content, head.end())
-    if len(body) < 12:
-        raise FormatError("the gridmap chunk is cut short", path)
-    width, height, resolution = struct.unpack_from("<iif", body)
+    width, height, resolution = struct.unpack_from("<iif", body.ljust(12, b"\0"))
     fits = len(body) == 12 + 4 * width * height
     if not (fits and width > 0 and height > 0 and 0 < resolution < np.inf):
         cells = f"{width} x {height} cells of {resolution} m"

@@ -62,5 +62,5 @@ def write_log(path, log):
 
 def _check_is_carmen(path):
     if not path.name.endswith(CARMEN_SUFFIXES):
-        carmen_names, ros_names = ", ".join(CARMEN_SUFFIXES), ", ".join(ROS_SUFFIXES)
-        raise FormatError(f"a CARMEN log is named {carmen_names}, a ROS bag {ros_names}", path)
+        carmen, ros = ", ".join(CARMEN_SUFFIXES), ", ".join(ROS_SUFFIXES)
+        raise FormatError(f"a CARMEN log is named {carmen}, a ROS bag {ros}", path)

@@ -63,7 +63,8 @@ def read_log(path, topic=None):
     except FormatError:
         raise
     except Exception as error:  # whatever rosbags' parsers happen to raise
-        raise FormatError(f"not a readable ROS bag ({error or type(error).__name__})", path) from None
+        reason = error or type(error).__name__
+        raise FormatError(f"not a readable ROS bag ({reason})", path) from None
     if moving:
         unread = f"{', '.join(sorted(moving))} of the bag is not read and every pose is (0, 0, 0)"
         remedy = "if the robot moved, set the poses with dataclasses.replace(log, poses=poses)"
@@ -94,5 +95,5 @@ def _scan(message):
     ranges = np.array(message.ranges, dtype=float)
     measured = (ranges >= message.range_min) & (ranges <= message.range_max)
     beams = Beams(ranges.size, message.angle_min, message.angle_increment, message.range_max)
-    stamp = message.header.stamp
-    return Scan(beams, np.where(measured, ranges, np.inf), (0, 0, 0), stamp.sec + 1e-9 * stamp.nanosec)
+    t = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+    return Scan(beams, np.where(measured, ranges, np.inf), (0, 0, 0), t)

@@ -25,12 +25,8 @@ RIGHT_ANGLED = 1e-6
 millimetre.
 """
 
-
-USUAL = {
-    **{"image": None, "origin": None, "resolution": None, "mode": "trinary", "negate": 0},
-    **{"occupied_thresh": 0.65, "free_thresh": 0.196},
-}
-"""What a key means that is missing; the first three must not be."""
+USUAL = {"mode": "trinary", "negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196}
+"""What those keys mean that a map need not have."""
 
 
 def write_map(path, occupancy, origin, resolution):
@@ -86,13 +82,13 @@ def read_map(path):
         If the YAML or its picture is not in order.
     """
     keys = USUAL | _read_keys(path)
-    origin = keys["origin"] if isinstance(keys["origin"], list) else []
-    origin = [_number(path, "origin", value) for value in origin]
+    written = keys.get("origin")
+    origin = [_number(path, "origin", v) for v in written] if isinstance(written, list) else []
     if len(origin) != 3 or not abs(origin[2]) <= RIGHT_ANGLED:
         rule = "origin must be [x, y, 0] (a turned map is not supported)"
-        raise FormatError(f"{rule}, got {keys['origin']!r}", path)
-    resolution = _number(path, "resolution", keys["resolution"])
-    grey = _read_grey(path, str(keys["image"]))[::-1]
+        raise FormatError(f"{rule}, got {written!r}", path)
+    resolution = _number(path, "resolution", keys.get("resolution"))
+    grey = _read_grey(path, str(keys.get("image")))[::-1]
     return _probabilities(path, keys, grey), origin[:2], resolution
 
 
@@ -139,16 +135,16 @@ def _probabilities(path, keys, grey):
     """Probabilities by the map's `mode`, set so that occupied and free cells are what the file's
     thresholds say.
     """
-    mode, negate = keys["mode"], keys["negate"]
+    mode = keys["mode"]
     from_file(path, check_choice, "mode", mode, ("trinary", "scale", "raw"))
-    from_file(path, check_choice, "negate", negate, (0, 1))  # or false and true
+    from_file(path, check_choice, "negate", keys["negate"], (0, 1))  # or false and true
     below, above = (_number(path, key, keys[key]) for key in ("free_thresh", "occupied_thresh"))
     if not 0 <= below <= above <= 1:
         rule = "thresholds must be 0 <= free_thresh <= occupied_thresh <= 1"
         raise FormatError(f"{rule}, got free_thresh {below:g} and occupied_thresh {above:g}", path)
     if mode == "raw":
         return np.where(grey <= 100, grey / 100, np.nan)
-    probability = (grey if negate else 255 - grey) / 255
+    probability = (grey if keys["negate"] else 255 - grey) / 255
     occupied, free = probability > above, probability < below
     just_free = np.nextafter(OCCUPIED_FROM, 0)
     sides = np.maximum(probability, OCCUPIED_FROM), np.minimum(probability, just_free)

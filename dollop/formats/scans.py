@@ -176,8 +176,11 @@ def longest_rise(values):
 
 
 def _usable_clock(path, t):
-    """Which of the scans recorded at `t` (T,) stay, (K,), and their times (K,): see `usable_scans`."""
-    keep = _without_strays(t, longest_rise(t))
+    """Which of the scans recorded at `t` (T,) stay (K,), and their times (K,): see `usable_scans`."""
+    keep = longest_rise(t)
+    far = np.diff(t[keep], prepend=-np.inf, append=np.inf) > LONGEST_GAP
+    stray = far[:-1] & far[1:]  # from both neighbours; the first and the last have but one
+    keep = keep if stray.sum() * 20 > len(keep) else keep[~stray]
     lost = len(t) - len(keep)
     if lost * 20 > len(t):
         out = f"{lost} of {len(t)} scans are out of order"
@@ -190,13 +193,3 @@ def _usable_clock(path, t):
     if gap > LONGEST_GAP:
         warn_of(path, f"the clock jumps by {gap:g} s from one scan to the next")
     return keep, t[keep]
-
-
-def _without_strays(t, keep):
-    """`keep` (K,), increasing in `t`, without the few scans that are far from both neighbours.
-
-    The first and the last have but one neighbour.
-    """
-    far = np.diff(t[keep], prepend=-np.inf, append=np.inf) > LONGEST_GAP
-    stray = far[:-1] & far[1:]
-    return keep if stray.sum() * 20 > len(keep) else keep[~stray]
