@@ -32,7 +32,8 @@ def room(side=8.0, resolution=0.05):
 
 def scan_of(ranges, pose=(4.0, 0.5, np.pi / 2)):
     ranges = np.atleast_2d(ranges)
-    return LaserLog(0.1 * np.arange(len(ranges)), ranges, ANGLES, np.tile(pose, (len(ranges), 1)), 20.0)
+    poses = np.tile(pose, (len(ranges), 1))
+    return LaserLog(0.1 * np.arange(len(ranges)), ranges, ANGLES, poses, 20.0)
 
 
 def hits(grid, x, y):
@@ -41,7 +42,7 @@ def hits(grid, x, y):
 
 
 def test_endpoints_lie_at_range_and_bearing():
-    """Readings are put into the world through the sensor's pose; what did not come back has no place."""
+    """Readings lie in the world by the sensor's pose; what did not come back has no place."""
     log = scan_of(np.full(181, 2.0))
     points = endpoints(log)[0]
     np.testing.assert_allclose(points[[0, 90, 180]], [[6, 0.5], [4, 2.5], [2, 0.5]], atol=1e-12)
@@ -49,14 +50,14 @@ def test_endpoints_lie_at_range_and_bearing():
 
 
 def test_foreground_is_what_the_map_does_not_explain_within_the_radius():
-    """Readings nearer than the background radius to a wall are background, the others are foreground."""
+    """Readings within the background radius of a wall are background, others are foreground."""
     points = np.array([[[4.0, 7.95], [4.0, 7.80], [4.0, 7.70], [4.0, 4.0], [np.nan, np.nan]]])
-    np.testing.assert_array_equal(foreground_mask(points, room()), [[False, False, True, True, False]])
-    np.testing.assert_array_equal(foreground_mask(points, room(), 0.5), [[False, False, False, True, False]])
+    assert np.flatnonzero(foreground_mask(points, room())).tolist() == [2, 3]
+    assert np.flatnonzero(foreground_mask(points, room(), 0.5)).tolist() == [3]
 
 
 def test_a_map_that_does_not_cover_the_scans_is_refused():
-    """The error says how many readings lie outside; a stray one is not yet an error, nor foreground."""
+    """The error says how many readings lie outside; a stray one is no error, nor foreground."""
     points = np.full((1, 20, 2), 4.0)
     points[0, 0] = 100.0
     assert foreground_mask(points, room()).sum() == 19
@@ -68,12 +69,12 @@ def test_a_map_that_does_not_cover_the_scans_is_refused():
 @pytest.mark.parametrize("radius", [0.0, -0.2, np.nan, np.inf])
 def test_background_radius_must_be_positive(radius):
     """The error names the value and the rule."""
-    with pytest.raises(ValueError, match=f"background_radius must be positive and finite, got {radius}"):
+    with pytest.raises(ValueError, match=f"background_radius must be .* finite, got {radius}"):
         foreground_mask(np.full((1, 1, 2), 4.0), room(), radius)
 
 
 def test_surfaces_are_filled_between_neighbouring_beams_only():
-    """Gaps up to `jump` close to less than a cell; jumps, other beams and other scans stay apart."""
+    """Gaps up to `jump` close to less than a cell; jumps, other beams and scans stay apart."""
     points = np.zeros((2, 4, 2))
     points[..., 0] = [[0.0, 0.2, 1.0, 1.2], [5.0, 5.2, 5.4, 5.6]]
     mask = np.array([[True, True, True, True], [True, False, True, True]])
@@ -131,12 +132,13 @@ def test_seen_free_knows_beam_range_and_field_of_view():
 
 @given(st.floats(-10, 10), st.booleans())
 def test_the_sensors_frame_has_no_favourite_zero(turn, all_round):
-    """Bearings counted from elsewhere, with the pose turned back as much, leave what is seen as it was."""
+    """Bearings counted from elsewhere, the pose turned back as much, change nothing."""
     angles = np.radians(np.arange(0.0, 360.0)) if all_round else ANGLES
     rng, pose = np.random.default_rng(0), np.array([4.0, 4.0, 0.3])
     points, ranges = rng.uniform(0, 8, (200, 2)), rng.uniform(0, 6, len(angles))
     expected = seen_free(points, pose, angles, ranges)
-    np.testing.assert_array_equal(seen_free(points, pose - [0, 0, turn], angles + turn, ranges), expected)
+    found = seen_free(points, pose - [0, 0, turn], angles + turn, ranges)
+    np.testing.assert_array_equal(found, expected)
     assert 20 < expected.sum() < 180
 
 
@@ -144,7 +146,8 @@ def test_a_laser_that_looks_all_round_has_no_gap():
     """Between its last beam and its first, each stands for its half."""
     bearings = np.linspace(-np.pi, np.pi, 1000)
     points = np.column_stack([np.cos(bearings), np.sin(bearings)])
-    assert seen_free(points, np.zeros(3), np.radians(np.arange(0.0, 360.0, 4.0)), np.full(90, 2.0)).all()
+    angles = np.radians(np.arange(0.0, 360.0, 4.0))
+    assert seen_free(points, np.zeros(3), angles, np.full(90, 2.0)).all()
 
 
 cells = st.sets(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=40)
@@ -165,7 +168,8 @@ def test_blobs_are_the_connected_components(occupied):
             front += near
         if len(blob) >= 4:
             expected.append(frozenset(blob))
-    found = {frozenset(map(tuple, blobs.cells[blobs.labels == k].tolist())) for k in range(len(blobs))}
+    cells = (blobs.cells[blobs.labels == k].tolist() for k in range(len(blobs)))
+    found = {frozenset(map(tuple, each)) for each in cells}
     assert found == set(expected)
     for k in range(len(blobs)):
         inside = blobs.cells[blobs.labels == k]
@@ -195,7 +199,8 @@ def test_min_area_is_a_hundred_square_centimetres():
 def test_boxes_envelop_their_blobs():
     """A box reaches from the outer edge of the first cell to that of the last."""
     blobs = find_blobs(np.array([[2, 3], [2, 4], [3, 4], [4, 5]]), 0.1)
-    np.testing.assert_allclose(bounding_boxes(blobs, np.array([1.0, 2.0]), 0.1), [[1.3, 2.2, 1.6, 2.5]])
+    boxes = bounding_boxes(blobs, np.array([1.0, 2.0]), 0.1)
+    np.testing.assert_allclose(boxes, [[1.3, 2.2, 1.6, 2.5]])
 
 
 def test_legs_within_a_stride_are_one_object():
@@ -215,7 +220,7 @@ def test_gain_out_of_range_is_named(gain):
 
 
 def test_a_cell_just_before_its_hit_is_not_swept():
-    """A beam sweeps a remembered cell only if it went on for a cell's side beyond it; else the cell keeps its value."""
+    """A beam sweeps a remembered cell only if it went on for a cell's side beyond it."""
     pose = np.array([4.0, 0.5, np.pi / 2])
     for beyond, value in ((0.04, 0.6), (0.06, 0.6 * 0.4)):
         grid = ForegroundGrid(room(), 0.6)
@@ -228,9 +233,10 @@ def test_a_cell_just_before_its_hit_is_not_swept():
 
 
 def test_surfaces_end_at_a_jump_of_thirty_centimetres():
-    """Neighbouring readings 0.29 m apart are one surface without a gap of a cell, 0.31 m apart they are two."""
+    """Neighbouring readings 0.29 m apart are one closed surface, 0.31 m apart they are two."""
     for gap, added in ((0.29, 5), (0.31, 0), (0.04, 0)):
-        scan, filled = surface_points(np.array([[[0.0, 0.0], [0.6 * gap, 0.8 * gap]]]), np.ones((1, 2), bool))
+        points = np.array([[[0.0, 0.0], [0.6 * gap, 0.8 * gap]]])
+        scan, filled = surface_points(points, np.ones((1, 2), bool))
         assert len(scan) == 2 + added
         if added:
             steps = np.diff(filled[np.argsort(filled[:, 0])], axis=0)
@@ -238,7 +244,7 @@ def test_surfaces_end_at_a_jump_of_thirty_centimetres():
 
 
 def test_occupied_is_above_one_half():
-    """Blobs and objects begin above 0.5: hit twice at a gain of 0.3 is occupied, hit once is not."""
+    """Blobs and objects begin above 0.5: hit twice at a gain of 0.3 is occupied, once is not."""
     grid, pose = ForegroundGrid(room(), 0.3), np.array([4.0, 0.5, np.pi / 2])
     can = np.concatenate([hits(grid, 3.91 + 0.05 * k, 3.0) for k in range(4)])
     for value, count in ((0.3, 0), (0.51, 1)):

@@ -19,7 +19,7 @@ def eight(turns, n):
 @pytest.mark.parametrize("n_laps", [2, 3, 5, 7])
 @pytest.mark.parametrize("seed", range(3))
 def test_laps_of_a_walked_figure_eight(n_laps, seed):
-    """As many laps are cut as were walked, each about as long as one, although the crossing is passed twice in each."""
+    """As many laps are cut as were walked, all as long, though each passes the crossing twice."""
     t, positions = walk_figure_eights(n_laps + 1, seed)
     one = len(t) / (n_laps + 1)
     walked = slice(int(0.3 * one), int((n_laps + 0.5) * one))
@@ -51,7 +51,8 @@ def test_exactly_five_laps_are_five():
 def test_laps_start_together_and_head_the_same_way():
     """Laps of a figure-eight start at one place in one direction."""
     found = laps(*walk_figure_eights(6, seed=8))
-    starts, ahead = np.array([lap[0] for lap in found]), np.array([lap[3] - lap[0] for lap in found])
+    starts = np.array([lap[0] for lap in found])
+    ahead = np.array([lap[3] - lap[0] for lap in found])
     assert np.linalg.norm(starts - starts.mean(axis=0), axis=1).max() < 0.35
     assert ((ahead @ ahead.mean(axis=0)) > 0).all()
 
@@ -93,12 +94,14 @@ def test_laps_do_not_depend_on_where_the_lab_lies(angle, x, y):
     """Turning and shifting the track turns and shifts its laps."""
     track = eight(3.4, 400)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    assert len(laps(np.arange(400), track @ turn.T + [x, y])) == len(laps(np.arange(400), track)) == 3
+    t = np.arange(400)
+    assert len(laps(t, track @ turn.T + [x, y])) == len(laps(t, track)) == 3
 
 
 def test_a_clock_that_runs_backwards():
-    """Laps need increasing times, one for each position; a single step back or a pause is enough to be refused."""
+    """Laps need increasing times, one per position; one step back or a pause is refused."""
     track, once = eight(2, 50), np.arange(50) == 20
-    for t in (np.arange(50)[::-1], np.zeros(50), np.arange(49), np.arange(50) - once, np.arange(50) - 1.3 * once):
+    clock = np.arange(50)
+    for t in (clock[::-1], np.zeros(50), clock[:-1], clock - once, clock - 1.3 * once):
         with pytest.raises(ValueError, match="t must increase"):
             laps(t, track)

@@ -11,7 +11,7 @@ from dollop.trajectory import distance_to_polyline
 
 
 def test_fit_recovers_a_known_system():
-    """Samples of a linear system that came to rest give back its matrix, up to the shrinkage of one in a thousand."""
+    """Samples of a linear system that came to rest give back its matrix, up to the shrinkage."""
     A, goal = np.array([[0.8, -0.15], [0.1, 0.85]]), np.array([2.0, -1.0])
     walks = [goal + powers_on(A, np.array(x0), 120) for x0 in ([3.0, 1.0], [-2.0, 2.0])]
     lds = LDS.fit(walks, retimed=False)
@@ -22,7 +22,7 @@ def test_fit_recovers_a_known_system():
 @settings(max_examples=50)
 @given(any_walks)
 def test_closed_form_is_least_squares(walks):
-    """The matrix solves the normal equations of the samples, the virtual ones of the shrinkage included."""
+    """The matrix solves the normal equations of samples and of the shrinkage's virtual ones."""
     statistics = LDS.fit(moving(walks), retimed=False).statistics
     offsets = [walk - walk[-1] for walk in walks]
     weight = np.sqrt(1e-3 * np.trace(statistics.G0) / 2)
@@ -35,7 +35,7 @@ def test_closed_form_is_least_squares(walks):
 @settings(max_examples=300)
 @given(any_walks, st.booleans())
 def test_stable_whatever_the_data(walks, retimed):
-    """The stability theorem: the spectral radius is below one for any trajectories, raw or re-timed."""
+    """Stability: the spectral radius is below one for any trajectories, raw or re-timed."""
     assert np.abs(np.linalg.eigvals(LDS.fit(moving(walks), retimed).A)).max() < 1
 
 
@@ -52,7 +52,7 @@ def test_stable_in_any_dimension(d, seed):
 @settings(max_examples=100)
 @given(any_walks, st.booleans(), st.tuples(st.floats(-20, 20), st.floats(-20, 20)))
 def test_lyapunov_function_never_grows(walks, retimed, start):
-    """Along the response from any start the Lyapunov function does not grow, and it is zero at the subgoal only."""
+    """Along any response the Lyapunov function does not grow; it is zero at the subgoal only."""
     lds = LDS.fit(moving(walks), retimed)
     values = lds.lyapunov(lds.response(start, 40))
     assert (np.diff(values) <= 1e-9 * values[0]).all()
@@ -86,22 +86,24 @@ def test_response_is_steps():
 
 
 def test_straight_lines_are_followed():
-    """A straight segment, which leaves the matrix undetermined across it, has a straight response."""
+    """A straight segment, which says nothing of what is across it, has a straight response."""
     lds = LDS.fit(np.linspace([1.0, 1.0], [4.0, 3.0], 30))
-    assert distance_to_polyline(lds.response([1.0, 1.0], 100), [[1.0, 1.0], [4.0, 3.0]]).max() < 1e-9
+    response = lds.response([1.0, 1.0], 100)
+    assert distance_to_polyline(response, [[1.0, 1.0], [4.0, 3.0]]).max() < 1e-9
 
 
 @pytest.mark.parametrize(("turn", "within"), [(45, 0.004), (90, 0.006), (120, 0.012)])
 def test_retiming_draws_arcs_well(turn, within):
-    """One re-timed LDS draws an arc of 1.3 m radius within millimetres, far better than one of the raw samples."""
+    """One re-timed LDS draws an arc of 1.3 m radius within millimetres, a raw one does not."""
     angle = np.linspace(0, np.radians(turn), 100)
     arc = 1.3 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    error = {r: distance_to_polyline(arc, LDS.fit(arc, r).response(arc[0], 600)).mean() for r in (True, False)}
-    assert error[True] < within < error[False]
+    responses = (LDS.fit(arc, retimed).response(arc[0], 600) for retimed in (True, False))
+    retimed, raw = (distance_to_polyline(arc, response).mean() for response in responses)
+    assert retimed < within < raw
 
 
 def test_no_unstable_system():
-    """Statistics that no trajectory has are refused, and so are those that are not finite or of another dimension."""
+    """Statistics that no trajectory has, not finite or of another dimension are refused."""
     with pytest.raises(ValueError, match=r"spectral radius below one, got 1\.0"):
         LDS(Statistics(np.eye(2), np.eye(2)), np.zeros(2))
     with pytest.raises(ValueError, match="G0 must be finite"):

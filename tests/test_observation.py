@@ -1,4 +1,4 @@
-"""Sec. II end to end: from a laser log to the user and the environment, and what happens to bad input."""
+"""Sec. II end to end: from a laser log to the user and the environment, and bad input."""
 
 import os
 from dataclasses import replace
@@ -35,7 +35,7 @@ def observation(recording, background):
 
 
 def test_the_user_is_tracked_through_the_occlusions(recording, observation):
-    """Five laps: within 60 mm of the true walker on average, near-side bias out; never farther than 0.3 m."""
+    """Five laps: within 60 mm of the walker on average, without the bias; always within 0.3 m."""
     user = observation.user
     bias, errors = track_error(user, recording.truth, recording.log.poses[0])
     assert user.occluded.sum() > 20
@@ -83,9 +83,10 @@ def test_the_other_choices_track_the_user_as_well(recording, background, tracker
 
 
 def test_nobody_there(recording, background):
-    """A log of a standing room has no user, and an empty environment where nothing is foreground."""
+    """A log of a standing room has no user, and no objects where nothing is foreground."""
     log = recording.log
-    still = replace(log, t=log.t[:40], ranges=np.repeat(log.ranges[:1], 40, axis=0), poses=log.poses[:40])
+    ranges = np.repeat(log.ranges[:1], 40, axis=0)
+    still = replace(log, t=log.t[:40], ranges=ranges, poses=log.poses[:40])
     assert observe(still, background).user is None
     explained = replace(still, ranges=np.full_like(still.ranges, np.inf))
     observation = observe(explained, background)
@@ -102,8 +103,9 @@ def test_observing_leaves_the_log_as_it_was(recording, background):
 
 @pytest.mark.parametrize("turn", [3 * np.pi / 2, np.pi, -2.0])
 def test_the_way_a_laser_counts_its_bearings_does_not_matter(recording, background, observation, turn):
-    """From 0 to 2 pi, offset by pi or by anything: the same scans give the same tracks, user and objects."""
-    log = replace(recording.log, angles=recording.log.angles + turn, poses=recording.log.poses - [0, 0, turn])
+    """From 0 to 2 pi or from anywhere: the same scans give the same tracks, user and objects."""
+    log = recording.log
+    log = replace(log, angles=log.angles + turn, poses=log.poses - [0, 0, turn])
     turned = observe(log, background)
     assert len(turned.tracks) == len(observation.tracks)
     np.testing.assert_allclose(turned.user.positions, observation.user.positions, atol=1e-6)
@@ -126,7 +128,7 @@ def test_a_map_elsewhere_is_refused(recording, background):
 
 
 def test_boxes_are_completed_away_from_the_sensor():
-    """Of a round can only the near arc is seen; its box is made as deep as it is wide, and no smaller than seen."""
+    """Of a round can only the near arc is seen; its box is made as deep as wide, never smaller."""
     angle = np.linspace(np.pi, 2 * np.pi, 50)
     near = np.array([2.0, 3.0]) + 0.2 * np.column_stack([np.cos(angle), np.sin(angle)])
     seen = np.concatenate([near.min(axis=0), near.max(axis=0)])
@@ -136,7 +138,7 @@ def test_boxes_are_completed_away_from_the_sensor():
 
 @pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA names no folder")
 def test_walkers_seen_at_leg_height():
-    """In a real log three people pace up and down; with legs joined within a stride the user is followed all along."""
+    """In a real log of three people, with legs joined within a stride, one is followed."""
     pytest.importorskip("rosbags")
     folder = Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / "people"
     log = read_log(folder / "demo_stationary_simple_environment.bag")
@@ -151,12 +153,14 @@ CAN = np.array([2.3, 3.4, 2.7, 3.8])
 
 
 def seen_from_the_sensor(walk, *boxes):
-    """Ten scans a second by a laser that stands: a walker 0.4 m wide at each of (N, 2), nan for away, and boxes."""
+    """Scans at 10 Hz from one place: a walker 0.4 m wide at each of (N, 2), nan away, and boxes."""
     room = np.vstack([WALLS, FURNITURE, *boxes])
-    places = [np.vstack([room, [*(p - 0.2), *(p + 0.2)]]) if np.isfinite(p[0]) else room for p in np.asarray(walk)]
+    walkers = ([[*(place - 0.2), *(place + 0.2)]] for place in np.asarray(walk))
+    places = [np.vstack([room, each]) if np.isfinite(each).all() else room for each in walkers]
     ranges = np.array([scan(SENSOR, each) for each in places])
     angles = np.deg2rad(np.arange(-90.0, 91.0))
-    return LaserLog(0.1 * np.arange(len(ranges)), ranges, angles, np.tile(SENSOR, (len(ranges), 1)), 20.0)
+    poses = np.tile(SENSOR, (len(ranges), 1))
+    return LaserLog(0.1 * np.arange(len(ranges)), ranges, angles, poses, 20.0)
 
 
 def away(count):
@@ -164,9 +168,10 @@ def away(count):
 
 
 def test_losses_are_counted():
-    """Out of sight for six seconds and seen again elsewhere, the user is lost once; never out of sight, never lost."""
+    """Hidden for six seconds and seen again elsewhere is lost once; never hidden, never lost."""
     one, other = np.linspace([2.0, 3.0], [6.0, 3.0], 40), np.linspace([6.5, 4.5], [3.0, 4.5], 35)
-    found = {k: observe(seen_from_the_sensor(np.concatenate([one, away(k), other])), room_map()) for k in (60, 0)}
+    walks = {k: np.concatenate([one, away(k), other]) for k in (60, 0)}
+    found = {k: observe(seen_from_the_sensor(walk), room_map()) for k, walk in walks.items()}
     assert found[60].losses == 1 and found[60].user.t[-1] == pytest.approx(13.4)
     assert observe(seen_from_the_sensor(one), room_map()).losses == 0
     assert observe(seen_from_the_sensor(away(20)), room_map()).losses == 0
@@ -181,7 +186,7 @@ def test_a_user_who_stops_is_no_object():
 
 @pytest.mark.parametrize(("there", "objects"), [(slice(0, 30), 1), (slice(35, 40), 0)], ids=["before", "at last"])
 def test_where_the_user_stood_last_is_no_object(there, objects):
-    """A blob where the user was in the last second is the user; one that the user left before is an object."""
+    """A blob where the user was in the last second is the user; one left before is an object."""
     log, grid = seen_from_the_sensor(away(1), CAN), ForegroundGrid(room_map(), 0.6)
     grid.update(foreground_hits(log, room_map())[0], SENSOR, log.angles, log.ranges[0])
     places = np.tile([7.0, 2.0], (40, 1))
@@ -192,14 +197,14 @@ def test_where_the_user_stood_last_is_no_object(there, objects):
 
 @pytest.mark.parametrize(("scans", "objects"), [(30, 0), (31, 1)])
 def test_what_stands_for_three_seconds_is_static(scans, objects):
-    """1 - 0.9^n exceeds a half at the seventh look of the slow grid, and every fifth scan is one."""
+    """1 - 0.9^n exceeds a half at the seventh look of the slow grid, every fifth scan."""
     observation = observe(seen_from_the_sensor(away(scans), CAN), room_map())
     assert len(observation.environment) == objects and observation.user is None
 
 
 @pytest.mark.parametrize("quarters", range(4))
 def test_cells_become_a_square_away_from_the_sensor(quarters):
-    """Four cells, two of them behind the third, from any of four sides: as deep as wide, from edge to edge of cells."""
+    """Four cells, two behind the third, from any of four sides: as deep as wide, edge to edge."""
     turn = np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), quarters)
     seen = np.array([[1.85, 3.0], [2.05, 3.0], [2.05, 3.05], [2.05, 3.1]]) @ turn.T
     tight = np.concatenate([seen.min(axis=0) - 0.025, seen.max(axis=0) + 0.025])

@@ -15,6 +15,7 @@ from dollop.tracking import (
     Tracker,
     draw_particles,
     identify_user,
+    kalman_filter,
     match_greedily,
     match_jointly,
     move_particles,
@@ -85,7 +86,8 @@ def test_smoother_agrees_with_filterpy():
         means.append(reference.x.copy())
         covariances.append(reference.P.copy())
     n = len(z)
-    smoothed = rts_smoother(np.array(means), np.array(covariances), [reference.F] * n, [reference.Q] * n)[0]
+    models = [reference.F] * n, [reference.Q] * n
+    smoothed = rts_smoother(np.array(means), np.array(covariances), *models)[0]
     positions, velocities = smooth(0.1 * np.arange(n), z, motion)
     np.testing.assert_allclose(positions[:, 0], smoothed[:, 0, 0], atol=1e-8)
     np.testing.assert_allclose(velocities[:, 0], smoothed[:, 1, 0], atol=1e-8)
@@ -93,8 +95,9 @@ def test_smoother_agrees_with_filterpy():
 
 @pytest.mark.parametrize("order", [2, 3])
 def test_smoothing_is_the_posterior_mean_through_gaps_and_an_uneven_clock(order):
-    """Filter and backward pass together equal solving for all states at once, occlusions and dropped scans included."""
-    rng, motion, n = np.random.default_rng(3), Motion(order=order, noise=0.3, measurement_sd=0.1), 12
+    """Filter and backward pass equal solving for all states at once, with scans missing too."""
+    rng, n = np.random.default_rng(3), 12
+    motion = Motion(order=order, noise=0.3, measurement_sd=0.1)
     t = np.cumsum(rng.choice([0.1, 0.2, 0.35], n))
     z = rng.normal(size=(n, 2)).cumsum(axis=0)
     z[[3, 4, 8]] = np.nan
@@ -117,6 +120,23 @@ def test_smoothing_is_the_posterior_mean_through_gaps_and_an_uneven_clock(order)
     np.testing.assert_allclose(velocities, states[:, 1], atol=1e-6)
 
 
+def test_out_of_sight_another_prediction_may_carry_on():
+    """What carries on predicts to the hidden scans only, and the filter goes on from there."""
+    t, z = np.arange(6.0), np.column_stack([np.arange(6.0), np.zeros(6)])
+    z[3:5] = np.nan
+    asked = []
+
+    def stand(i, means, covariances, F, Q):
+        asked.append(i)
+        return means * [[1.0], [0.0]], predict(means, covariances, F, Q)[1]
+
+    filtered, predicted, _ = kalman_filter(t, z, Motion(), stand)
+    places = np.array([means[0, 0] for means, _ in filtered])
+    assert asked == [3, 4] and (len(filtered), len(predicted)) == (6, 5)
+    np.testing.assert_array_equal(places[3:5], places[[2, 2]])
+    assert places[2, 0] < places[5, 0] < z[5, 0]
+
+
 costs = st.integers(0, 5).flatmap(
     lambda k: st.integers(0, 5).flatmap(
         lambda m: st.lists(st.lists(st.floats(0, 10), min_size=m, max_size=m), min_size=k, max_size=k).map(
@@ -128,18 +148,19 @@ costs = st.integers(0, 5).flatmap(
 
 @given(costs)
 def test_joint_matching_is_the_cheapest_of_all(cost):
-    """The Hungarian matching equals the best over all permutations, unmatched tracks at the price of the gate."""
+    """The Hungarian matching is the best of all permutations, unmatched tracks costing the gate."""
     tracks, objects = match_jointly(cost, 4.0)
     k, m = cost.shape
     padded = np.full((k, m + k), 4.0)
     padded[:, :m] = cost
-    best = min((padded[range(k), p].sum() for p in itertools.permutations(range(m + k), k)), default=0.0)
+    chosen = itertools.permutations(range(m + k), k)
+    best = min((padded[range(k), columns].sum() for columns in chosen), default=0.0)
     assert cost[tracks, objects].sum() + 4.0 * (k - len(tracks)) == pytest.approx(best)
 
 
 @given(costs)
 def test_greedy_matching_takes_the_nearest_pair_and_stays_one_to_one(cost):
-    """No track or object is used twice, the nearest pair is in, and none left over is within the gate."""
+    """Nothing is used twice, the nearest pair is in, none left over is within the gate."""
     tracks, objects = match_greedily(cost, 4.0)
     assert len(set(tracks)) == len(tracks) and len(set(objects)) == len(objects)
     if cost.size and cost.min() <= 4.0:
@@ -159,7 +180,7 @@ def test_an_occluded_walker_keeps_its_track_and_moves_on_in_a_straight_line():
 
 
 def test_the_gate_grows_with_the_occlusion():
-    """A walker that turned while out of sight is taken back, though it is farther off than the smallest gate."""
+    """A walker that turned out of sight is taken back, though beyond the smallest gate."""
     path = straight([0, 0], [1.0, 0.0])
     path[50:] = path[50] + (T[50:, None] - T[50]) * [0.35, 0.8]
     objects = seen(path, hide=[(0, 50, 62)], noise=0.02)
@@ -175,14 +196,14 @@ def test_the_gate_grows_with_the_occlusion():
     ids=["seen all along", "beyond 0.5 m", "four seconds out of sight", "beyond 1.5 m"],
 )
 def test_the_gate_is_half_a_metre_at_least_and_a_metre_and_a_half_at_most(first, jump, tracks):
-    """From a prediction that is well known an object may be 0.5 m off; after four seconds out of sight, 1.5 m."""
+    """An object may be 0.5 m off a sure prediction; after four seconds out of sight, 1.5 m."""
     still = straight([2, 2], [0, 0])
     still[60:] += [0.6 * jump, 0.8 * jump]
     assert len(track_objects(T, seen(still, hide=[(0, first, 60)]))) == tracks
 
 
 def test_an_object_out_of_sight_for_too_long_has_disappeared():
-    """After `disappear_after` seconds the same place bears a new track; the old one ends where it was last seen."""
+    """After `disappear_after` the same place bears a new track; the old one ends when last seen."""
     still = straight([2, 2], [0, 0])
     objects = seen(still, hide=[(0, 20, 60)])
     assert len(track_objects(T, objects, Tracker(disappear_after=5.0))) == 1
@@ -191,10 +212,11 @@ def test_an_object_out_of_sight_for_too_long_has_disappeared():
 
 
 def test_one_disappears_while_others_stay():
-    """What has been out of sight for too long is forgotten also while another object is seen all along."""
+    """What is out of sight for too long is forgotten also while another object is seen."""
     there, gone = straight([5, 5], [0, 0]), straight([2, 2], [0, 0])
     tracks = track_objects(T, seen(there, gone, hide=[(1, 20, 60)]), Tracker(disappear_after=3.0))
-    assert [(track.t[0], track.t[-1]) for track in tracks] == [(T[0], T[-1]), (T[0], T[19]), (T[60], T[-1])]
+    lives = [(track.t[0], track.t[-1]) for track in tracks]
+    assert lives == [(T[0], T[-1]), (T[0], T[19]), (T[60], T[-1])]
 
 
 @pytest.mark.parametrize("matching", ["greedy", "joint"])
@@ -211,21 +233,23 @@ def test_crossing_objects_keep_their_identity(matching, occlusion):
 
 
 def test_particles_without_a_laser_are_the_kalman_prediction():
-    """Drawn and moved particles have the mean and the covariance that the Kalman filter predicts."""
+    """Drawn and moved particles have the mean and covariance that the Kalman filter predicts."""
     rng, motion = np.random.default_rng(0), Motion(noise=2.0)
     mean, P = np.array([[1.0, -2.0], [0.5, 0.3]]), np.array([[0.04, 0.03], [0.03, 0.5]])
     F, Q = motion.transition(0.4)
     cloud = draw_particles(mean, P, rng, count=20_000)
-    for particles, truth in ((cloud, (mean, P)), (move_particles(cloud, F, Q, rng), (F @ mean, F @ P @ F.T + Q))):
+    moved = move_particles(cloud, F, Q, rng)
+    for particles, truth in ((cloud, (mean, P)), (moved, (F @ mean, F @ P @ F.T + Q))):
         moments = particle_moments(particles)
         np.testing.assert_allclose(moments[0], truth[0], atol=0.03)
         np.testing.assert_allclose(moments[1], truth[1], atol=0.03)
         spread = particles - moments[0]
-        np.testing.assert_allclose(np.einsum("pi,pj->ij", spread[..., 0], spread[..., 1]) / 20_000, 0, atol=0.03)
+        across = np.einsum("pi,pj->ij", spread[..., 0], spread[..., 1]) / 20_000
+        np.testing.assert_allclose(across, 0, atol=0.03)
 
 
 def test_particles_do_not_wait_where_the_laser_sees_nobody():
-    """A particle where a beam went on is not the occluded object: the prediction stays in the shadow."""
+    """A particle where a beam went on is not the occluded object: it stays in the shadow."""
     path = straight([0, 0], [1.0, 0.0])
     objects = seen(path, hide=[(0, 50, 64)], noise=0.02)
     shadow = lambda i, points: points[:, 0] > 5.5  # noqa: E731 beyond x = 5.5 m all is in sight
@@ -251,7 +275,9 @@ def moved_at(speeds, occluded=False):
     """A track of the given speeds (80,) at EIGHTHS."""
     speeds = np.broadcast_to(speeds, EIGHTHS.shape)
     still = np.zeros((len(EIGHTHS), 2))
-    return Track(EIGHTHS, still, np.column_stack([speeds, 0 * speeds]), np.broadcast_to(occluded, EIGHTHS.shape), still)
+    velocities = np.column_stack([speeds, 0 * speeds])
+    hidden = np.broadcast_to(occluded, EIGHTHS.shape)
+    return Track(EIGHTHS, still, velocities, hidden, still)
 
 
 @pytest.mark.parametrize(
@@ -264,7 +290,7 @@ def moved_at(speeds, occluded=False):
     ids=["faster", "hardly faster", "soon slower"],
 )
 def test_another_takes_over_when_it_has_been_clearly_faster_for_a_while(rival, taken_over):
-    """The first to move is the user once half a second old and as long fast; 0.3 m/s faster for as long takes over."""
+    """First to move for half a second is the user; 0.3 m/s faster for as long takes over."""
     users = identify_user(EIGHTHS, [moved_at(1.0), moved_at(rival)])
     expected = np.where(EIGHTHS >= 1.0, 0, -1)
     expected[np.greater_equal(EIGHTHS, taken_over)] = 1
@@ -272,7 +298,7 @@ def test_another_takes_over_when_it_has_been_clearly_faster_for_a_while(rival, t
 
 
 def test_out_of_sight_the_user_stays_the_user():
-    """Who is the user stays so while occluded, though a slower one is seen; what is only ever occluded never is."""
+    """The user stays so while occluded, though a slower one is seen; who is never seen never is."""
     slow = moved_at(1.0)
     assert (identify_user(EIGHTHS, [moved_at(2.0, EIGHTHS >= 4), slow])[EIGHTHS > 2] == 0).all()
     assert (identify_user(EIGHTHS, [moved_at(2.0, EIGHTHS >= 0), slow])[EIGHTHS > 2] == 1).all()

@@ -1,5 +1,7 @@
 """Trajectories: arc length, re-timing, alignment, distances, and what is no trajectory."""
 
+import itertools
+
 import numpy as np
 import pytest
 from walks import walk_figure_eights
@@ -53,7 +55,8 @@ def test_distance_to_polyline_agrees_with_a_plain_loop():
         share = np.clip((point - a) @ (b - a) / max((b - a) @ (b - a), 1e-300), 0, 1)
         return np.linalg.norm(point - a - share * (b - a))
 
-    plain = [min(to_edge(point, a, b) for a, b in zip(polyline[:-1], polyline[1:], strict=True)) for point in points]
+    edges = list(itertools.pairwise(polyline))
+    plain = [min(to_edge(point, *edge) for edge in edges) for point in points]
     assert np.allclose(distance_to_polyline(points, polyline), plain)
 
 
@@ -74,17 +77,19 @@ def test_warp_is_the_best_of_all_monotone_ones(seed):
         apart = ((walk[at[1:]] - reference[1:]) ** 2).sum()
         return apart + (step**2 * (np.diff(at) - 2.0) ** 2).sum()
 
-    every = [np.cumsum([0, *moves]) for moves in np.ndindex(*(5,) * (n - 1)) if sum(moves) == 2 * n - 2]
+    whole = (moves for moves in np.ndindex(*(5,) * (n - 1)) if sum(moves) == 2 * n - 2)
+    every = [np.cumsum([0, *moves]) for moves in whole]
     found = np.round(_monotone_warp(reference, walk[None])[0] * (2 * n - 2)).astype(int)
     assert cost(found) == pytest.approx(min(map(cost, every)))
 
 
 def test_alignment_undoes_uneven_detours():
-    """Walks that differ in where they swing wide are brought much closer than by equal shares of arc length."""
+    """Walks that swing wide at different places come much closer than by equal shares of length."""
     _, track = walk_figure_eights(5, seed=3, drift=0.12)
     walks = [track[start : start + 170] for start in range(0, 680, 170)]
     equal_shares = np.stack([resample(walk, 199) for walk in walks])
-    apart = [np.linalg.norm(each - each.mean(axis=0), axis=2).mean() for each in (equal_shares, align(walks, 199)[0])]
+    ways = equal_shares, align(walks, 199)[0]
+    apart = [np.linalg.norm(each - each.mean(axis=0), axis=2).mean() for each in ways]
     assert apart[1] < 0.75 * apart[0]
 
 
@@ -92,7 +97,8 @@ def test_alignment_keeps_ends_and_order():
     """Every walk is sampled from its start to its end and never backwards."""
     walks = [walk_figure_eights(1, seed)[1] for seed in range(3)]
     aligned, share = align(walks, 100)
-    assert np.allclose(aligned[:, 0], [walk[0] for walk in walks]) and np.allclose(share[:, [0, -1]], [0, 1])
+    assert np.allclose(aligned[:, 0], [walk[0] for walk in walks])
+    assert np.allclose(share[:, [0, -1]], [0, 1])
     assert (np.diff(share, axis=1) >= 0).all()
 
 
