@@ -1,44 +1,46 @@
-"""The drawing vocabulary: one colour per meaning, the plane in metres, used by figures and
-notebooks alike.
+"""The drawing vocabulary: one colour per meaning, and the plane in metres.
 
 What is in the room has colours of Okabe and Ito's palette, what is compared in graphs has those of
 Tol's: colour-blind readers can tell them apart. Red boxes, green law and yellow robot are also the
 paper's. Black is for what is neutral: subgoals, corners, readings, writing.
+
+Everything is drawn into axes that are given; a label goes into their legend once.
 """
 
-from contextlib import contextmanager
 from itertools import pairwise
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.colors import ListedColormap
 from matplotlib.patches import Circle, Ellipse, Rectangle
 from matplotlib.patheffects import withStroke
 
+from dollop.trajectory import arc_length
+
 USER = "#0072B2"  # blue: the user's track
 OBSTACLE = "#D55E00"  # vermilion: boxes of foreground objects
-ROBOT = "#F0E442"  # yellow: the robot
 LAW = "#009E73"  # green: the control law and its response
 SUBGOAL = "#000000"
-MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper
 RUN = "#CC79A7"  # purple: where the robot went
 OCCLUDED = "#E69F00"  # orange: predictions while the user is occluded
 BACKGROUND = "#8C8C8C"  # grey: the background map, and how things were before
 TRUTH = "#56B4E9"  # light blue: where the user or an object really was
-RAY = "#C3CED6"  # pale grey: the laser's rays
+_ROBOT = "#F0E442"  # yellow
+_MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper
+_RAY = "#C3CED6"  # pale grey: the laser's rays
 
-RUN_SHADES = ("#CC79A7", "#7A3B62", "#E3A9C8", "#A6437C", "#4F2340")
-RUN_LINES = ("-", (0, (7, 1.5)), (0, (5, 1.2, 1, 1.2)), (0, (3, 1)), (0, (9, 1.5, 1, 1.5, 1, 1.5)))
+_RUN_SHADES = ("#CC79A7", "#7A3B62", "#E3A9C8", "#A6437C", "#4F2340")
+_RUN_LINES = ("-", (0, (7, 1.5)), (0, (5, 1.2, 1, 1.2)), (0, (3, 1)), (0, (9, 1.5, 1, 1.5, 1, 1.5)))
 """Shades of RUN and dashes by which a few runs are told apart."""
 
-HEADS_AT = 0.18, 0.65
-"""Where along a law its arrowheads are, as shares of its length: away from the crossing of a
-figure-eight.
-"""
+_HEADS_AT = 0.18, 0.65
+"""Where along a law its arrowheads are, as shares of its length: not where an eight crosses."""
+
+_RIM = 0.25
+"""Radius in m of the robot, drawn as a circle."""
 
 HALO = withStroke(linewidth=2.5, foreground="white")
 """Keeps writing legible where it lies over lines."""
-
-RIM = 0.25  # m, radius of the robot drawn as a circle
 
 STYLE = {
     "figure.dpi": 100,
@@ -49,17 +51,32 @@ STYLE = {
     "axes.spines.right": False,
     "legend.frameon": False,
 }
+"""House style, as matplotlib's settings."""
 
 
-@contextmanager
 def style():
-    """House style for everything drawn inside the `with` block."""
-    with plt.rc_context(STYLE):
-        yield
+    """House style for everything that is drawn inside a `with` block.
+
+    Returns
+    -------
+    context manager
+    """
+    return plt.rc_context(STYLE)
 
 
 def plane(ax=None, title=None):
-    """Axes for the plane: metres, equal aspect."""
+    """Axes for the plane: in metres, with equal aspect.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes, optional
+        The current ones by default.
+    title : str, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
     ax = ax or plt.gca()
     ax.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     if title:
@@ -67,72 +84,23 @@ def plane(ax=None, title=None):
     return ax
 
 
-def grid_map(ax, grid, colour=BACKGROUND):
-    """Occupied cells of an OccupancyGrid."""
-    rows, columns = grid.occupancy.shape
-    x, y = grid.origin[:2]
-    extent = (x, x + columns * grid.resolution, y, y + rows * grid.resolution)
-    image = np.ma.masked_where(~grid.occupied, np.ones(grid.occupancy.shape))
-    ax.imshow(image, origin="lower", extent=extent, cmap=plt.matplotlib.colors.ListedColormap([colour]))
-
-
-def boxes(ax, boxes, label=None, colour=OBSTACLE, **kwargs):
-    """Boxes (N, 4): xmin, ymin, xmax, ymax in m."""
-    kwargs = {"fill": False, "edgecolor": colour, "linewidth": 2} | kwargs
-    for k, (x0, y0, x1, y1) in enumerate(boxes):
-        ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, label=label if k == 0 else None, **kwargs))
-
-
-def robot(ax, pose, radius=RIM, label=None):
-    """The robot at pose (x, y, theta): a yellow circle with its heading."""
-    x, y, theta = pose
-    ax.add_patch(Circle((x, y), radius, facecolor=ROBOT, edgecolor="black", zorder=4))
-    ax.plot([], [], "o", color=ROBOT, markeredgecolor="black", markersize=10, label=label)
-    ax.plot([x, x + radius * np.cos(theta)], [y, y + radius * np.sin(theta)], color="black", zorder=5)
-
-
-def path(ax, positions, label=None, colour=USER, **kwargs):
-    """A path (N, 2) in m."""
-    kwargs = {"linewidth": 1} | kwargs
-    ax.plot(*np.asarray(positions).T[:2], color=colour, label=label, **kwargs)
-
-
-def law(ax, response, label="control law", **kwargs):
-    """The response (N, 2) of a control law, and on its way two arrowheads that say which way it is
-    walked.
-    """
-    response = np.asarray(response)
-    kwargs = {"linewidth": 2, "colour": LAW} | kwargs
-    path(ax, response, label, **kwargs)
-    walked = np.append(0, np.hypot(*np.diff(response, axis=0).T).cumsum())
-    for share in HEADS_AT:
-        k = np.searchsorted(walked, share * walked[-1]).clip(1, len(response) - 1)
-        head = {"arrowstyle": "-|>", "mutation_scale": 18, "color": kwargs["colour"], "linewidth": 0}
-        ax.annotate("", response[k], response[k - 1], arrowprops=head | {"shrinkA": 0, "shrinkB": 0}, zorder=5)
-
-
-def subgoals(ax, subgoals, label="subgoals"):
-    """Crosses at the subgoals (K, 2)."""
-    ax.plot(*np.asarray(subgoals).T, "x", color=SUBGOAL, markersize=9, markeredgewidth=2.5, zorder=6, label=label)
-
-
-def scan(ax, log, i, label="laser scan"):
-    """Scan i of a LaserLog in the world: rays, and points where something came back."""
-    x, y, theta = log.poses[i]
-    back = np.isfinite(log.ranges[i])
-    reach = np.where(back, log.ranges[i], log.max_range)
-    ends = np.column_stack([x + reach * np.cos(theta + log.angles), y + reach * np.sin(theta + log.angles)])
-    ax.plot(
-        *np.stack([np.broadcast_to([x, y], ends.shape), ends], axis=1)[back].transpose(2, 1, 0),
-        color=RAY,
-        linewidth=0.5,
-    )
-    ax.plot(*ends[back].T, ".", color="black", markersize=3, label=label)
-
-
 def workspace(grid, pose=None, obstacles=(), ax=None, title=None):
-    """Axes for the plane with the background map, and where given the watching robot and the
-    obstacles' boxes.
+    """Axes for the plane with the background map, the watching robot and the obstacles' boxes.
+
+    Parameters
+    ----------
+    grid : OccupancyGrid
+    pose : (3,) sequence of float, optional
+        Of the robot: x, y in m, theta in rad.
+    obstacles : (N, 4) array_like
+        xmin, ymin, xmax, ymax in m.
+    ax : matplotlib.axes.Axes, optional
+        The current ones by default.
+    title : str, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
     """
     ax = plane(ax, title)
     grid_map(ax, grid)
@@ -142,62 +110,216 @@ def workspace(grid, pose=None, obstacles=(), ax=None, title=None):
     return ax
 
 
-def cells(ax, values, grid, **kwargs):
-    """Values (H, W) of the cells of `grid` as an image; cells that are zero stay blank."""
-    image = np.ma.masked_equal(values.reshape(grid.occupancy.shape), 0)
-    return ax.imshow(image, origin="lower", extent=grid.extent, **({"cmap": "Blues"} | kwargs))
-
-
 def legend(ax):
-    """A legend in one row under the axes, where it hides nothing."""
+    """A legend in rows under the axes, where it hides nothing.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    """
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=5, columnspacing=1.0)
 
 
-def track(ax, track, label="track", **kwargs):
-    """A Track's positions, dotted where it was occluded."""
-    path(ax, track.positions, label, **kwargs)
-    ax.plot(*track.positions[track.occluded].T, ".", color=OCCLUDED, markersize=4, zorder=3, label="occluded")
+def grid_map(ax, grid, colour=BACKGROUND):
+    """The occupied cells of a map.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    grid : OccupancyGrid
+    colour : str
+    """
+    cells(ax, grid.occupied.astype(float), grid, cmap=ListedColormap([colour]))
+
+
+def cells(ax, values, grid, **look):
+    """The values of a map's cells as an image; cells that are zero stay blank.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    values : (H, W) or (H W,) array
+    grid : OccupancyGrid
+        Where the cells lie.
+    **look
+        Options of `Axes.imshow`.
+
+    Returns
+    -------
+    matplotlib.image.AxesImage
+    """
+    image = np.ma.masked_equal(values.reshape(grid.occupancy.shape), 0)
+    return ax.imshow(image, origin="lower", extent=grid.extent, **({"cmap": "Blues"} | look))
+
+
+def boxes(ax, boxes, label=None, colour=OBSTACLE, **look):
+    """Boxes of objects.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    boxes : (N, 4) array_like
+        xmin, ymin, xmax, ymax in m.
+    label : str, optional
+    colour : str
+    **look
+        Options of `matplotlib.patches.Rectangle`.
+    """
+    look = {"fill": False, "edgecolor": colour, "linewidth": 2, "label": label} | look
+    for x0, y0, x1, y1 in boxes:
+        ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **look))
+        look["label"] = None
+
+
+def robot(ax, pose, radius=_RIM, label=None):
+    """The robot as a circle with its heading.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    pose : (3,) sequence of float
+        x, y in m, theta in rad.
+    radius : float
+        In m.
+    label : str, optional
+    """
+    x, y, theta = pose
+    ax.add_patch(Circle((x, y), radius, facecolor=_ROBOT, edgecolor="black", zorder=4))
+    ax.plot([], [], "o", color=_ROBOT, markeredgecolor="black", markersize=10, label=label)
+    ahead = [x, x + radius * np.cos(theta)], [y, y + radius * np.sin(theta)]
+    ax.plot(*ahead, color="black", zorder=5)
+
+
+def scan(ax, log, i, label="laser scan"):
+    """A laser scan in the world: a ray and a point where something came back.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    log : LaserLog
+    i : int
+        Which of its scans.
+    label : str, optional
+    """
+    x, y, theta = log.poses[i]
+    back = np.isfinite(log.ranges[i])
+    reach, bearings = log.ranges[i, back], theta + log.angles[back]
+    xs, ys = x + reach * np.cos(bearings), y + reach * np.sin(bearings)
+    rays = np.stack([np.full_like(xs, x), xs]), np.stack([np.full_like(ys, y), ys])
+    ax.plot(*rays, color=_RAY, linewidth=0.5)
+    ax.plot(xs, ys, ".", color="black", markersize=3, label=label)
+
+
+def path(ax, positions, label=None, colour=USER, **look):
+    """A path in the plane.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    positions : (N, 2) or (N, 3) array_like
+        In m; a third column, the heading of poses, is not drawn.
+    label : str, optional
+    colour : str
+    **look
+        Options of `Axes.plot`.
+    """
+    ax.plot(*np.asarray(positions).T[:2], color=colour, label=label, **({"linewidth": 1} | look))
+
+
+def track(ax, track, label="track", **look):
+    """The positions of a track, dotted where it was occluded.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    track : Track
+    label : str, optional
+    **look
+        Options of `path`.
+    """
+    path(ax, track.positions, label, **look)
+    dots = {"color": OCCLUDED, "markersize": 4, "zorder": 3, "label": "occluded"}
+    ax.plot(*track.positions[track.occluded].T, ".", **dots)
+
+
+def subgoals(ax, subgoals, label="subgoals"):
+    """Subgoals as crosses.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    subgoals : (K, 2) array_like
+        In m.
+    label : str, optional
+    """
+    look = {"color": SUBGOAL, "markersize": 9, "markeredgewidth": 2.5, "zorder": 6}
+    ax.plot(*np.asarray(subgoals).T, "x", label=label, **look)
+
+
+def law(ax, response, label="control law", **look):
+    """The response of a control law, and two arrowheads that say which way it is walked.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    response : (N, 2) array_like
+        In m.
+    label : str, optional
+    **look
+        Options of `path`.
+    """
+    response, look = np.asarray(response), {"linewidth": 2, "colour": LAW} | look
+    path(ax, response, label, **look)
+    walked = arc_length(response)
+    head = {"mutation_scale": 18, "color": look["colour"], "linewidth": 0}
+    for share in _HEADS_AT:
+        k = np.searchsorted(walked, share * walked[-1]).clip(1, len(response) - 1)
+        _arrow(ax, response[k - 1], response[k], **head)
 
 
 def runs(ax, runs):
-    """Where the robot went: one line per Run.
+    """Where the robot went.
 
     Kidnapped runs have a look and a number each; the kidnapping is a dotted leap to a numbered dot.
     A circle is the rim of the robot where a run first touched something.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    runs : sequence of Run
     """
     apart = any(len(run.kidnapped) for run in runs)
     for k, run in enumerate(runs):
         look = {"linewidth": 0.9, "alpha": 0.8, "colour": RUN}
         if apart:
-            look = {"linewidth": 1.2, "colour": RUN_SHADES[k % 5], "linestyle": RUN_LINES[k % 5]}
+            shade, line = _RUN_SHADES[k % 5], _RUN_LINES[k % 5]
+            look = {"linewidth": 1.2, "colour": shade, "linestyle": line}
+        places = run.true_poses[:, :2]
         leaps = np.searchsorted(run.t, run.kidnapped - 0.5 * run.t[1])
-        for n, part in enumerate(np.split(run.true_poses[:, :2], leaps)):
+        for n, part in enumerate(np.split(places, leaps)):
             path(ax, part, "robot's runs" if k == n == 0 else None, **look)
         for leap in leaps:
-            path(ax, run.true_poses[leap - 1 : leap + 1], "kidnapped" if k == 0 else None, "black", linestyle=":")
-            place = run.true_poses[leap, :2]
-            ax.plot(*place, "o", color="black", markersize=4, zorder=6)
-            written = {"textcoords": "offset points", "ha": "center", "va": "center", "path_effects": [HALO]}
-            ax.annotate(str(k + 1), place, xytext=(0, 9), weight="bold", zorder=8, **written)
+            leapt = places[leap - 1 : leap + 1]
+            path(ax, leapt, "kidnapped" if k == 0 else None, "black", linestyle=":")
+            ax.plot(*places[leap], "o", color="black", markersize=4, zorder=6)
+            _write(ax, k + 1, places[leap], (0, 9), ha="center", va="center", weight="bold")
     hit = [run for run in runs if run.collisions]
     for run in hit:
-        ax.add_patch(Circle(first_contact(run), RIM, fill=False, edgecolor="black", linewidth=0.8, zorder=7))
+        rim = {"fill": False, "edgecolor": "black", "linewidth": 0.8, "zorder": 7}
+        ax.add_patch(Circle(_first_contact(run), _RIM, **rim))
     if hit:
         look = {"color": "black", "markersize": 10, "fillstyle": "none", "markeredgewidth": 0.8}
         ax.plot([], [], "o", label="first contact, robot's rim", **look)
 
 
-def first_contact(run):
-    """Where (2,) a Run that touched something was when its rim, taken as a circle, first met an
-    obstacle.
-    """
+def _first_contact(run):
+    """Where (2,) a Run that touched something was when its rim first met an obstacle."""
     met = np.flatnonzero(run.clearance < 0)
     return run.true_poses[met[0] if len(met) else run.clearance.argmin(), :2]
 
 
 def cdhmm(ax, model, sd=2.0):
-    """A SubgoalHMM in the plane: its states, the steps between them, and the most-likely path in
-    red.
+    """A CDHMM in the plane: its states, the steps between them, and its most-likely path in red.
 
     Parameters
     ----------
@@ -214,34 +336,34 @@ def cdhmm(ax, model, sd=2.0):
     steps = np.argwhere(model.transitions > 0).tolist()
     if any((u, v) not in path_steps for u, v in steps):
         ax.plot([], [], color=BACKGROUND, label="other steps")
-    ax.plot([], [], color=MOST_LIKELY, label="most-likely path")
+    ax.plot([], [], color=_MOST_LIKELY, label="most-likely path")
     for u, v in steps:
-        colour = MOST_LIKELY if (u, v) in path_steps else BACKGROUND
-        step(ax, model.means[u], model.means[v], 0.5 + 2.0 * model.transitions[u, v], colour)
+        colour = _MOST_LIKELY if (u, v) in path_steps else BACKGROUND
+        width = 0.5 + 2.0 * model.transitions[u, v]
+        _arrow(ax, *model.means[[u, v]], color=colour, linewidth=width, shrinkB=2)
     for state, (mean, covariance) in enumerate(zip(model.means, model.covariances, strict=True)):
-        label = f"states, {sd:g} sd" if state == 0 else None
-        ellipse(ax, mean, covariance, sd, label=label)
-        written = {"textcoords": "offset points", "zorder": 8, "path_effects": [HALO]}
-        ax.annotate(str(state), mean, xytext=(6, 6), **written)
-        if state == way[0]:
-            ax.annotate("start", mean, xytext=(-8, 0), ha="right", va="center", style="italic", **written)
-        if state == way[-1]:
-            ax.annotate("end", mean, xytext=(14, -6), va="center", style="italic", **written)
+        _ellipse(ax, mean, covariance, sd, None if state else f"states, {sd:g} sd")
+        _write(ax, state, mean, (6, 6))
+    _write(ax, "start", model.means[way[0]], (-8, 0), ha="right", va="center", style="italic")
+    _write(ax, "end", model.means[way[-1]], (14, -6), va="center", style="italic")
     ax.plot(*model.means.T, ".", color=SUBGOAL, markersize=6, zorder=7)
 
 
-def step(ax, tail, head, width, colour):
-    """An arrow from one place to another, `width` in points."""
-    drawn = {"arrowstyle": "-|>", "linewidth": width, "color": colour, "shrinkA": 0, "shrinkB": 2}
-    ax.annotate("", head, tail, arrowprops=drawn, zorder=5)
+def _arrow(ax, tail, head, **look):
+    """An arrow from one place (2,) to another."""
+    look = {"arrowstyle": "-|>", "shrinkA": 0, "shrinkB": 0} | look
+    ax.annotate("", head, tail, arrowprops=look, zorder=5)
 
 
-def ellipse(ax, mean, covariance, sd=2.0, colour=SUBGOAL, label=None):
-    """Where a normal distribution of this mean (2,) and covariance (2, 2) reaches `sd` standard
-    deviations.
-    """
+def _write(ax, text, place, offset, **look):
+    """Write at an offset, in points, from a place (2,)."""
+    look = {"textcoords": "offset points", "path_effects": [HALO], "zorder": 8} | look
+    ax.annotate(str(text), place, xytext=offset, **look)
+
+
+def _ellipse(ax, mean, covariance, sd, label):
+    """Where a normal distribution of mean (2,) and covariance (2, 2) reaches `sd` deviations."""
     variances, axes = np.linalg.eigh(covariance)
-    width, height = 2 * sd * np.sqrt(variances)
     angle = np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))
-    look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.15, "zorder": 3}
-    ax.add_patch(Ellipse(mean, width, height, angle=angle, label=label, **look))
+    look = {"facecolor": SUBGOAL, "edgecolor": SUBGOAL, "alpha": 0.15, "zorder": 3}
+    ax.add_patch(Ellipse(mean, *(2 * sd * np.sqrt(variances)), angle=angle, label=label, **look))
