@@ -48,6 +48,14 @@ def endpoints(log):
     -------
     (T, B, 2) float array
         m; `nan` where nothing came back.
+
+    Examples
+    --------
+    >>> from dollop.laser import LaserLog
+    >>> log = LaserLog([0.0], [[1.0, np.inf]], [0.0, 1.0], [[2.0, 0.0, np.pi / 2]], max_range=8.0)
+    >>> endpoints(log)
+    array([[[ 2.,  1.],
+            [nan, nan]]])
     """
     ranges = np.where(np.isfinite(log.ranges), log.ranges, np.nan)
     bearings = log.poses[:, 2:] + log.angles
@@ -78,6 +86,13 @@ def foreground_mask(points, background, background_radius=0.20):
     ValueError
         If more than a tenth of the readings lie outside the map, or the radius is not positive and
         finite.
+
+    Examples
+    --------
+    >>> from dollop.gridmap import OccupancyGrid
+    >>> wall = OccupancyGrid([[1.0, 0.0, 0.0, 0.0]], origin=(0.0, 0.0), resolution=0.1)
+    >>> foreground_mask(np.array([[0.25, 0.05], [0.35, 0.05], [np.nan, np.nan]]), wall)
+    array([False,  True, False])
     """
     check_positive("background_radius", background_radius)
     distances = background.distance_at(points)  # nan outside the map
@@ -195,6 +210,19 @@ class ForegroundGrid:
     ------
     ValueError
         A gain out of its range.
+
+    Examples
+    --------
+    A cell that was hit twice keeps its value while something nearer casts a shadow on it:
+
+    >>> from dollop.gridmap import OccupancyGrid
+    >>> grid = ForegroundGrid(OccupancyGrid(np.zeros((1, 9)), (0.0, 0.0), 0.1), gain=0.6)
+    >>> pose, angles = np.array([0.0, 0.05, 0.0]), np.array([-0.1, 0.0, 0.1])
+    >>> for _ in range(2):
+    ...     grid.update(np.array([8]), pose, angles, np.full(3, 0.85))
+    >>> grid.update(np.array([4]), pose, angles, np.full(3, 0.45))
+    >>> grid.value[[4, 8]]
+    array([0.6 , 0.84])
     """
 
     def __init__(self, background, gain):

@@ -215,6 +215,14 @@ class LDS:
         ------
         ValueError
             Not two finite numbers each.
+
+        Examples
+        --------
+        The subgoal is where it rests:
+
+        >>> lds = LDS.fit([[0.0, 1.0], [1.0, 0.5], [2.0, 0.0]])
+        >>> lds.step([2.0, 0.0])
+        array([2., 0.])
         """
         return self.goal + (check_states(x) - self.goal) @ self.A.T
 
@@ -327,5 +335,10 @@ def dot(a, b):
     -------
     (...) float array
         In the units' product.
+
+    Examples
+    --------
+    >>> dot(np.array([[3.0, 4.0], [1.0, 0.0]]), np.array([3.0, 4.0]))
+    array([25.,  3.])
     """
     return np.einsum("...d,...d->...", a, b)

@@ -35,6 +35,17 @@ def retimed_statistics(aligned):
         (start, length) -> Statistics (..., d, d). Start (...) and length count cuts; all segments
         of one call have one length, because then they also share the places at which they are
         sampled.
+
+    Examples
+    --------
+    Those of the piece cut out and re-timed:
+
+    >>> from dollop.trajectory import retime
+    >>> line = np.linspace([0.0, 0.0], [4.0, 2.0], 9)
+    >>> quick = retimed_statistics(line[None])(1, 3)
+    >>> slow = Statistics.of(retime(line[2:9], STEPS, DECAY))
+    >>> np.allclose(quick.G0, slow.G0), np.allclose(quick.G1, slow.G1)
+    (True, True)
     """
 
     def statistics(start, length):
@@ -63,6 +74,15 @@ def raw_statistics(walks, moments):
     callable
         (start, length) -> Statistics (..., d, d), as of `retimed_statistics`, summed over the
         walks.
+
+    Examples
+    --------
+    Those of the samples between the cuts:
+
+    >>> walk = np.random.default_rng(0).normal(size=(9, 2)).cumsum(axis=0)
+    >>> quick = raw_statistics([walk], np.arange(0.0, 9.0)[None])(2, 5)
+    >>> np.allclose(quick.G1, Statistics.of(walk[2:8]).G1)
+    True
     """
     cuts = moments.round().astype(int)
     sums = [running_sums(walk - walk.mean(axis=0)) for walk in walks]
@@ -115,6 +135,15 @@ def segment_errors(path, statistics):
     (C, C) float array
         In m: [i, j] for the segment from cut i to cut j, summed over the cuts between; `inf` where
         there is none between, since such a segment would not be put to any test.
+
+    Examples
+    --------
+    Every piece of a straight line is a segment without error:
+
+    >>> line = np.linspace([0.0, 0.0], [4.0, 2.0], 9)
+    >>> errors = segment_errors(line[::2], retimed_statistics(line[None]))
+    >>> bool((errors[np.isfinite(errors)] < 1e-9).all())
+    True
     """
     errors = np.full((len(path), len(path)), np.inf)
     for length in range(2, len(path)):
@@ -225,6 +254,15 @@ def best_segments(errors, n_segments):
     -------
     (S + 1,) int array or None
         The cuts, the first 0 and the last C - 1; None if there are too few candidates.
+
+    Examples
+    --------
+    As in `fewest_segments`, segments that end or begin at cut 2 are perfect:
+
+    >>> errors = np.ones((5, 5)) * np.maximum(np.arange(5) - np.arange(5)[:, None], 1)
+    >>> errors[0, 2] = errors[2, 4] = 0
+    >>> best_segments(errors, 2)
+    array([0, 2, 4])
     """
     return divide(errors, lambda total, k: k == n_segments)
 

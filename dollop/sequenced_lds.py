@@ -157,6 +157,13 @@ class SequencedLDS:
         ------
         ValueError
             No trajectory (see `check_trajectory`).
+
+        Examples
+        --------
+        >>> turn = np.linspace(0, np.pi / 2, 50)[:, None]
+        >>> law = SequencedLDS.fit(np.hstack([np.cos(turn), np.sin(turn)]))
+        >>> law.error(law.response())
+        0.0
         """
         return self.errors(trajectory)["mean"]
 

@@ -152,6 +152,15 @@ def predict(means, covariances, F, Q):
     -------
     means : (K, n, 2) float array
     covariances : (K, n, n) float array
+
+    Examples
+    --------
+    What is not measured gets less sure:
+
+    >>> F, Q = Motion().transition(1.0)
+    >>> _, covariances = predict(np.zeros((1, 2, 2)), np.eye(2)[None], F, Q)
+    >>> bool(covariances[0, 0, 0] > 1)
+    True
     """
     return F @ means, F @ covariances @ F.T + Q
 
@@ -467,6 +476,15 @@ def particle_moments(particles):
     mean : (n, 2) float array
     covariance : (n, n) float array
         A little more than measured, so that it is never singular.
+
+    Examples
+    --------
+    Those of many particles are those that they were drawn from:
+
+    >>> mean, covariance = np.zeros((2, 2)), np.array([[2.0, 1.0], [1.0, 3.0]])
+    >>> cloud = draw_particles(mean, covariance, np.random.default_rng(0), 100_000)
+    >>> np.allclose(particle_moments(cloud)[1], covariance, atol=0.05)
+    True
     """
     mean = particles.mean(axis=0)
     spread = particles - mean
@@ -533,6 +551,15 @@ def kalman_filter(t, measurements, motion, carry_on=None):
         After each scan, and before all but the first.
     transitions : list of N - 1 (n, n) float arrays
         F between each scan and the next.
+
+    Examples
+    --------
+    What comes later changes nothing (it does in `smooth`):
+
+    >>> t, z = np.arange(5.0), np.random.default_rng(0).normal(size=(5, 2))
+    >>> whole, part = (kalman_filter(t[:n], z[:n], Motion())[0] for n in (5, 3))
+    >>> np.array_equal(whole[2][0], part[2][0])
+    True
     """
     state = motion.birth(measurements[:1])
     models = {dt: motion.transition(dt) for dt in np.unique(np.diff(t))}
@@ -574,6 +601,15 @@ def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):
     -------
     (T,) int array
         Index into `tracks`, -1 while nobody has moved yet.
+
+    Examples
+    --------
+    Nobody's velocity counts in the first half second; then the fastest must lead for half a second:
+
+    >>> t, still = np.arange(6) / 4, np.zeros((6, 2))
+    >>> slow, fast = (Track(t, still, still + v, np.zeros(6, bool), still) for v in (0.2, 1.0))
+    >>> identify_user(t, [slow, fast])
+    array([-1, -1, -1, -1,  1,  1])
     """
     speed, seen = np.zeros((2, len(t), len(tracks) + 1))  # the last column is nobody's, for -1
     for k, track in enumerate(tracks):
@@ -627,5 +663,4 @@ def user_track(t, tracks, users, motion=None):
         return None
     lived = slice(seen[0], seen[-1] + 1)
     t, measurements = t[lived], measurements[lived]
-    states = smooth(t, measurements, motion)
-    return Track(t, *states, np.isnan(measurements[:, 0]), measurements)
+    return Track(t, *smooth(t, measurements, motion), np.isnan(measurements[:, 0]), measurements)
