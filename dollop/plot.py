@@ -288,19 +288,19 @@ def runs(ax, runs):
     ax : matplotlib.axes.Axes
     runs : sequence of Run
     """
-    apart = any(len(run.kidnapped) for run in runs)
+    apart, label = any(len(run.kidnapped) for run in runs), "kidnapped"
     for k, run in enumerate(runs):
         look = {"linewidth": 0.9, "alpha": 0.8, "colour": RUN}
         if apart:
             shade, line = _RUN_SHADES[k % 5], _RUN_LINES[k % 5]
             look = {"linewidth": 1.2, "colour": shade, "linestyle": line}
         places = run.true_poses[:, :2]
-        leaps = np.searchsorted(run.t, run.kidnapped - 0.5 * run.t[1])
+        leaps = np.searchsorted(run.t, run.kidnapped - 0.5 * run.t[1:2].sum())
         for n, part in enumerate(np.split(places, leaps)):
             path(ax, part, "robot's runs" if k == n == 0 else None, **look)
         for leap in leaps:
-            leapt = places[leap - 1 : leap + 1]
-            path(ax, leapt, "kidnapped" if k == 0 else None, "black", linestyle=":")
+            path(ax, places[leap - 1 : leap + 1], label, "black", linestyle=":")
+            label = None
             ax.plot(*places[leap], "o", color="black", markersize=4, zorder=6)
             _write(ax, k + 1, places[leap], (0, 9), ha="center", va="center", weight="bold")
     hit = [run for run in runs if run.collisions]
