@@ -25,7 +25,16 @@ METHODS = {
 
 
 def picture(image):
-    """A rendered image (H, W, 3) as a figure of exactly its pixels."""
+    """A rendered image as a figure of exactly its pixels.
+
+    Parameters
+    ----------
+    image : (H, W, 3) array
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     height, width = image.shape[:2]
     dpi = STYLE["savefig.dpi"]
     figure = plt.figure(figsize=(width / dpi, height / dpi), layout="none")
@@ -34,7 +43,16 @@ def picture(image):
 
 
 def png(figure):
-    """A figure as PNG bytes, for an `ipywidgets.Image`; the figure is closed."""
+    """A figure as PNG, for an `ipywidgets.Image`; the figure is closed.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+
+    Returns
+    -------
+    bytes
+    """
     with io.BytesIO() as stream:
         figure.savefig(stream, format="png", dpi=figure.dpi)
         plt.close(figure)
@@ -42,9 +60,19 @@ def png(figure):
 
 
 def legend_below(figure, *axes, columns=6):
-    """One legend for what is drawn in the axes named, under the whole figure."""
+    """One legend under a whole figure, where a label that several axes have stands once.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    *axes : matplotlib.axes.Axes
+        Those whose labels it has.
+    columns : int
+        At most so many in a row.
+    """
     shown = {}
     for ax in axes:
         handles, labels = ax.get_legend_handles_labels()
         shown = dict(zip(labels, handles, strict=True)) | shown
-    figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=columns, columnspacing=1.0)
+    look = {"loc": "outside lower center", "ncols": columns, "columnspacing": 1.0}
+    figure.legend(shown.values(), shown.keys(), **look)
