@@ -1,4 +1,4 @@
-"""What is asked of numbers and arrays that come from outside: errors name the value and the rule."""
+"""What is asked of numbers and arrays from outside; errors name the value and the rule."""
 
 import numpy as np
 
@@ -16,11 +16,20 @@ def check_positive(name, value, or_zero=False):
     name : str
         What to call it in the error.
     value : float
+        In any unit.
     or_zero : bool
+        Whether zero passes.
 
     Raises
     ------
     ValueError
+        With name, rule and value.
+
+    Examples
+    --------
+    >>> check_positive("tolerance", float("nan"))
+    Traceback (most recent call last):
+    ValueError: tolerance must be positive and finite, got nan
     """
     if not (0 < value < np.inf or (or_zero and value == 0)):
         rule = "finite and not negative" if or_zero else "positive and finite"
@@ -35,11 +44,14 @@ def check_choice(name, value, known):
     name : str
         What to call it in the error.
     value : object
-    known : iterable of str
+        What was chosen.
+    known : container of str
+        What can be.
 
     Raises
     ------
     ValueError
+        With name, value and what is known.
 
     Examples
     --------
@@ -72,6 +84,7 @@ def checked_array(name, values, *shape, finite=True):
     Raises
     ------
     ValueError
+        If the shape is another, or a value is infinite or NaN and may not be.
 
     Examples
     --------
@@ -103,11 +116,12 @@ def checked_positions(name, values):
     Returns
     -------
     (N, 2) float array
+        A copy, in m.
 
     Raises
     ------
     ValueError
-        Another shape, a value that is not finite, or farther than 1e9 m from the origin.
+        If the shape is another, a value not finite, or one farther than 1e9 m from the origin.
     """
     positions = checked_array(name, values, "N", 2)
     farthest = np.abs(positions).max(initial=0)

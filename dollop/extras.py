@@ -7,7 +7,7 @@ from dollop.checks import check_choice
 __all__ = ["EXTRAS", "need"]
 
 EXTRAS = {"lab": "pybullet", "ros": "rosbags", "baseline": "hmmlearn", "cluster": "distributed"}
-"""The module by which each extra is known to be there; those of pyproject.toml that the code needs."""
+"""The module by which each extra of pyproject.toml that the code asks for is known to be there."""
 
 
 def need(extra):

@@ -1,4 +1,7 @@
-"""Occupancy grid maps: built from a laser log with known poses, read and written as ROS and CARMEN maps."""
+"""Occupancy grid maps (Sec. II): built from a laser log with known poses, read and written.
+
+The cell arithmetic of the library lives here, once: `in_cells` and what is made of it.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,11 +22,10 @@ MAX_CELLS = 100_000_000
 
 @dataclass(frozen=True, eq=False)
 class OccupancyGrid:
-    """How likely each cell of the plane is occupied.
+    """How likely each cell of the plane is occupied: the paper's background map (Sec. II).
 
-    A cell is *occupied* from a probability of 0.5 on, *free* below, and *unknown* where no beam has been.
-
-    The array is a copy, and read-only: what has been checked stays as it is.
+    A cell is *occupied* from a probability of 0.5 on, *free* below, and *unknown* where no beam has
+    been. The array is a copy, and read-only: what has been checked stays as it is.
 
     Attributes
     ----------
@@ -41,7 +43,9 @@ class OccupancyGrid:
 
     Examples
     --------
-    >>> grid = OccupancyGrid([[0.0, 0.0, 1.0], [0.0, np.nan, 1.0]], origin=(0.0, 0.0), resolution=0.1)
+    Where the map ends, nothing is known: that is neither near nor far.
+
+    >>> grid = OccupancyGrid([[0.0, 0.0, 1.0], [0.0, np.nan, 1.0]], (0.0, 0.0), resolution=0.1)
     >>> grid.distance_at([[0.05, 0.05], [0.25, 0.15], [0.35, 0.0]]).round(3).tolist()
     [0.2, 0.0, nan]
     """
@@ -70,9 +74,10 @@ class OccupancyGrid:
     def from_log(cls, log, resolution=0.05, max_range=20.0):
         """Count hits and passes of every beam; a cell's occupancy is hits / (hits + passes).
 
-        Where a beam ends, its cell is hit; the cells before are passed, each as long as the beam runs in it. A beam
-        that does not come back passes all cells up to the maximum range. What moves through the scene is thus swept
-        away by the beams that pass there later; what stands still for most of the log stays.
+        Where a beam ends, its cell is hit; the cells before are passed, each as long as the beam
+        runs in it. A beam that does not come back passes all cells up to the maximum range. What
+        moves through the scene is thus swept away by the beams that pass there later; what stands
+        still for most of the log stays.
 
         Parameters
         ----------
@@ -81,7 +86,8 @@ class OccupancyGrid:
         resolution : float, optional
             Side of a cell in m.
         max_range : float, optional
-            Up to which distance from the sensor to believe a beam, in m: 20 m as in CARMEN's scan matcher (`vasco`).
+            Up to which distance from the sensor to believe a beam, in m: 20 m as in CARMEN's scan
+            matcher (`vasco`).
 
         Returns
         -------
@@ -91,11 +97,25 @@ class OccupancyGrid:
         Raises
         ------
         ValueError
-            If the grid would have more than 100 million cells, or a parameter is not positive and finite.
+            If the grid would have more than 100 million cells, or a parameter is not positive and
+            finite.
 
         Notes
         -----
-        The counting model of D. Hähnel et al., "Map building with mobile robots in dynamic environments" (ICRA 2003).
+        The counting model of D. Hähnel et al., "Map building with mobile robots in dynamic
+        environments" (ICRA 2003); the paper (Sec. II) takes its map from CARMEN.
+
+        Examples
+        --------
+        One beam of 1 m: what it passes is free, what it hits is occupied.
+
+        >>> from dollop.laser import LaserLog
+        >>> log = LaserLog([0.0], [[1.0]], [0.0], [[0.0, 0.0, 0.0]], max_range=8.0)
+        >>> grid = OccupancyGrid.from_log(log, resolution=0.25)
+        >>> grid.occupied[tuple(grid.world_to_cell([1.0, 0.0]))].item()
+        True
+        >>> grid.free[tuple(grid.world_to_cell([0.3, 0.0]))].item()
+        True
         """
         check_positive("resolution", resolution)
         check_positive("max_range", max_range)
@@ -117,12 +137,13 @@ class OccupancyGrid:
 
     @classmethod
     def load(cls, path):
-        """Read a ROS map_server map (`.yaml`, which names its picture, PGM or PNG) or a CARMEN map (`.map`).
+        """Read a map of ROS map_server or of CARMEN, as its name says.
 
         Parameters
         ----------
         path : str or Path
-            The file.
+            `.yaml` or `.yml`, which names its picture, PGM or PNG: ROS
+            (http://wiki.ros.org/map_server); `.map`, packed or not: CARMEN (`map_io.h`).
 
         Returns
         -------
@@ -136,14 +157,22 @@ class OccupancyGrid:
         return from_file(path, cls, *_format_of(path).read_map(path))
 
     def save(self, path):
-        """Write a ROS map_server map (`.yaml`, and beside it a `.pgm` of the same name) or a CARMEN map (`.map`).
+        """Write a map of ROS map_server or of CARMEN, as its name says.
 
         A CARMEN map keeps the occupancy as float32, a ROS map in 256 steps of grey.
 
         Parameters
         ----------
         path : str or Path
-            The file; it appears whole or not at all, and the picture with it.
+            `.yaml` or `.yml`: ROS, and beside it a `.pgm` of the same name; `.map`: CARMEN. The
+            file appears whole or not at all, and the picture with it.
+
+        Raises
+        ------
+        FormatError
+            If the name says neither.
+        OSError
+            If it cannot be written.
         """
         _format_of(path).write_map(path, self.occupancy, self.origin, self.resolution)
 
@@ -164,7 +193,7 @@ class OccupancyGrid:
 
     @property
     def extent(self):
-        """xmin, xmax, ymin, ymax in m, as matplotlib's `imshow` takes them (with `origin="lower"`)."""
+        """xmin, xmax, ymin, ymax in m, as `imshow` takes them (with `origin="lower"`)."""
         height, width = self.occupancy.shape
         right, top = in_metres(width, height, self.origin, self.resolution)
         return self.origin[0], right, self.origin[1], top
@@ -247,7 +276,8 @@ class OccupancyGrid:
         Returns
         -------
         (...,) float array
-            Metres; NaN off the map, where nothing is known (see `covers`), so that it is neither near nor far.
+            Metres; NaN off the map, where nothing is known (see `covers`), so that it is neither
+            near nor far.
         """
         points = np.asarray(points, dtype=float)
         inside = self.covers(points)
@@ -258,7 +288,18 @@ class OccupancyGrid:
 
 
 def check_is_map(path):
-    """Raise FormatError if the name is not one of a map."""
+    """Refuse a name that is not one of a map.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, there or not.
+
+    Raises
+    ------
+    FormatError
+        If it ends neither in `.yaml` or `.yml` (ROS) nor in `.map` (CARMEN).
+    """
     if Path(path).suffix not in (".map", ".yaml", ".yml"):
         raise FormatError("a map is named .yaml (ROS) or .map (CARMEN)", path)
 
@@ -316,6 +357,7 @@ def in_cells(x, y, origin, resolution):
     Returns
     -------
     column, row : float or (...) float array
+        In units of cells.
     """
     return (x - origin[0]) / resolution, (y - origin[1]) / resolution
 
@@ -365,8 +407,17 @@ def flat_cells(points, origin, resolution, shape):
         Flat indices of the cells of the points that lie on the grid.
     inside : (M,) bool array
         Which of the points do.
+
+    Examples
+    --------
+    A point on a border belongs to the cell above it or to its right.
+
+    >>> points = np.array([[0.0, 0.0], [1.0, 1.0], [3.0, 0.5]])
+    >>> [each.tolist() for each in flat_cells(points, (0.0, 0.0), 1.0, (2, 3))]
+    [[0, 4], [True, True, False]]
     """
-    column, row = np.floor(in_cells(*points.T, origin, resolution)).astype(np.intp)
+    places = in_cells(*points.T, origin, resolution)
+    column, row = (np.floor(each).astype(np.intp) for each in places)
     inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
     return (row * shape[1] + column)[inside], inside
 
@@ -388,6 +439,12 @@ def covered_cells(boxes, origin, resolution, shape):
     Returns
     -------
     (H, W) bool array
+        What only touches a cell does not reach into it.
+
+    Examples
+    --------
+    >>> covered_cells(np.array([[0.5, 0.0, 2.0, 1.0]]), (0.0, 0.0), 1.0, (2, 3)).tolist()
+    [[True, True, False], [False, False, False]]
     """
     covered = np.zeros(shape, dtype=bool)
     corners = np.reshape(boxes, (-1, 2, 2)).T

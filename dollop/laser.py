@@ -12,7 +12,7 @@ __all__ = ["LaserLog"]
 
 @dataclass(frozen=True, eq=False)
 class LaserLog:
-    """Scans of one planar laser, with the sensor's pose at each.
+    """Scans of one planar laser, with the sensor's pose at each (Sec. II).
 
     The arrays are copies, and read-only: what has been checked stays as it is.
 
@@ -32,13 +32,14 @@ class LaserLog:
     Raises
     ------
     ValueError
-        If shapes do not fit, a range is NaN, negative or finite beyond `max_range`, or an order is not increasing.
+        If shapes do not fit, a range is NaN, negative or finite beyond `max_range`, or times or
+        angles do not increase.
 
     Examples
     --------
-    >>> LaserLog(t=[0.0], ranges=[[1.0, -1.0]], angles=[0.0, 1.5], poses=[[2.0, 0.0, np.pi]], max_range=8.0)
-    Traceback (most recent call last):
-    ValueError: a range must be in [0, max_range = 8], or inf where nothing came back; got -1.0 in scan 0, beam 1
+    >>> log = LaserLog([0.0], [[1.0, np.inf]], [0.0, 1.5], [[2.0, 0.0, -np.pi]], max_range=8.0)
+    >>> log, log.poses[0, 2] == np.pi
+    (LaserLog of 1 scans in 0.0 s, 2 beams over 86 degrees, np.True_)
     """
 
     t: np.ndarray

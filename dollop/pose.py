@@ -1,4 +1,7 @@
-"""Poses in the plane, (x, y, theta) in m and rad: angles wrapped, rotations, and what lies between two poses."""
+"""Poses (x, y, theta) in the plane: angles wrapped, rotations, what lies between two poses.
+
+Plane geometry as in S. Thrun, W. Burgard, D. Fox, "Probabilistic Robotics" (2005), ch. 5.
+"""
 
 from math import cos, pi, sin
 
@@ -39,6 +42,7 @@ def rotation(angle):
     Returns
     -------
     (..., 2, 2) float array
+        [[cos, -sin], [sin, cos]] of each.
 
     Examples
     --------
@@ -54,6 +58,8 @@ def rotation(angle):
 def moved_pose(pose, distance, turn):
     """The pose after a short arc, driven in the direction half-way through its turn.
 
+    The inverse of `motion_between`, and the motion that the localisation takes odometry for.
+
     Parameters
     ----------
     pose : (3,) sequence of float
@@ -66,11 +72,15 @@ def moved_pose(pose, distance, turn):
     Returns
     -------
     (3,) float array
+        x, y in m, theta in rad, wrapped.
 
     Examples
     --------
-    >>> moved_pose(np.zeros(3), 1.0, 0.0).tolist()
-    [1.0, 0.0, 0.0]
+    What was driven is what lies between the poses.
+
+    >>> pose = (1.0, 2.0, 3.0)
+    >>> motion_between(pose, moved_pose(pose, 0.5, 0.4)).round(6).tolist()
+    [0.5, 0.0, 0.4]
     """
     x, y, theta = pose
     middle = theta + turn / 2

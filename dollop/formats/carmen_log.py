@@ -1,8 +1,8 @@
 """CARMEN's log files, those of the paper's toolkit [6]: laser scans and odometry.
 
-The format follows CARMEN's sources (`writelog.c`, `readlog.c`, `laser_messages.h` of CARMEN 0.7). A
-log is text, one message per line: name, contents, time of the message in s, host, time since the log
-began.
+The format follows CARMEN's sources (`writelog.c`, `readlog.c`, `laser_messages.h` of CARMEN 0.7).
+A log is text, one message per line: name, contents, time of the message in s, host, time since the
+log began.
 """
 
 import gzip
@@ -55,9 +55,9 @@ def read_log(path, max_range=None):
     """Laser scans of a CARMEN log, plain or gzipped.
 
     ROBOTLASER1 messages are read where there are any, since they state their own geometry, and
-    FLASER messages otherwise; all other messages are passed over. The pose is the laser's. A
-    reading at or beyond the maximum range, a reading that is an error code of a SICK
-    (`FULL_SCALES`), and a reading of zero become `inf`: nothing came back.
+    FLASER messages otherwise, as in CARMEN (`readlog.c`); all other messages are passed over. The
+    pose is the laser's. A reading at or beyond the maximum range, a reading that is an error code
+    of a SICK (`FULL_SCALES`), and a reading of zero become `inf`: nothing came back.
 
     Parameters
     ----------
@@ -71,6 +71,7 @@ def read_log(path, max_range=None):
     Returns
     -------
     LaserLog
+        `inf` where nothing came back.
 
     Raises
     ------
@@ -207,16 +208,16 @@ def _numbers(fields):
 
 
 def write_log(path, log):
-    """Write scans as a CARMEN log of ROBOTLASER1 messages, which state the laser's geometry;
-    gzipped if named `.gz`.
+    """Write scans as a CARMEN log of ROBOTLASER1 messages, which state the laser's geometry.
 
-    Ranges are written to 1 mm, poses and times to six decimals, as CARMEN does; `inf` becomes the
-    maximum range. The log holds the laser only: its pose stands for the robot's too.
+    Ranges are written to 1 mm, poses and times to six decimals, as CARMEN does (`writelog.c`);
+    `inf` becomes the maximum range. The log holds the laser only: its pose stands for the robot's
+    too.
 
     Parameters
     ----------
     path : str or Path
-        The file; it appears whole or not at all.
+        The file, gzipped if named `.gz`; it appears whole or not at all.
     log : LaserLog
         The scans; their beams must be evenly spaced.
 
@@ -224,6 +225,17 @@ def write_log(path, log):
     ------
     ValueError
         If the beams are not evenly spaced, which CARMEN cannot express.
+
+    Examples
+    --------
+    What is read back is what was written, to the format's precision.
+
+    >>> import tempfile
+    >>> log = LaserLog([7.5], [[1.2345, np.inf]], [-0.5, 0.5], [[1.0, 2.0, 3.0]], max_range=8.0)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_log(f"{folder}/a.log.gz", log)
+    ...     read_log(f"{folder}/a.log.gz").ranges.tolist()
+    [[1.234, inf]]
     """
     count = log.angles.size
     fov = log.angles[-1] - log.angles[0]
@@ -244,7 +256,7 @@ def write_log(path, log):
 
 
 def _written_ranges(log):
-    """Ranges that keep their meaning: a distance stays in (0, max_range), nothing else reaches it."""
+    """Ranges that keep their meaning: distances stay in (0, max_range), nothing else reaches it."""
     below = (np.ceil(log.max_range * 1000 - 1e-6) - 1) / 1000
     return np.where(np.isinf(log.ranges), below + 0.001, np.clip(log.ranges, 0.001, below))
 
@@ -257,7 +269,7 @@ def _packed(stream, path):
 
 
 def read_odometry(path):
-    """ODOM messages of a CARMEN log, plain or gzipped.
+    """ODOM messages of a CARMEN log, plain or gzipped (`writelog.c`).
 
     Messages that the clock puts out of order, as loggers write them now and then, are left out with
     a warning.
@@ -270,12 +282,18 @@ def read_odometry(path):
     Returns
     -------
     Odometry
+        Of the messages in order.
 
     Raises
     ------
     FormatError
         If there is no ODOM message, more than a few are broken, or the clock is in order for less
         than half of them: odometry without a time cannot be set against anything.
+
+    Warns
+    -----
+    UserWarning
+        If messages were left out.
     """
     good, bad = _messages(read_bytes(path), b"ODOM", _parse_odometry)
     if not good:

@@ -1,4 +1,4 @@
-"""CARMEN's map files, the occupancy grids of the paper's toolkit [6] (`map_io.h` of CARMEN 0.7)."""
+"""CARMEN's map files, the occupancy grids of the paper's toolkit [6] (`map_io.h`, CARMEN 0.7)."""
 
 import re
 import struct
@@ -18,12 +18,12 @@ GRIDMAP_CHUNK, NAMED_CHUNK = 1, 128
 
 
 def read_map(path):
-    """Occupancy of a CARMEN map file (`CARMENMAPFILE`, version v020), plain or gzipped.
+    """Occupancy of a CARMEN map file, plain or gzipped.
 
-    After comment lines and the label the file is a sequence of chunks: one byte of type, four of
-    size, then ten of description. The gridmap chunk holds two int32 sizes, a float32 resolution and
-    the float32 probabilities, x-major; -1 is unknown. Index times resolution is the world
-    coordinate of a cell's *centre* (`carmen_map_to_world`).
+    The version is v020 (`map_io.h`). After comment lines and the label the file is a sequence of
+    chunks: one byte of type, four of size, then ten of description. The gridmap chunk holds two
+    int32 sizes, a float32 resolution and the float32 probabilities, x-major; -1 is unknown. Index
+    times resolution is the world coordinate of a cell's *centre* (`carmen_map_to_world`).
 
     Parameters
     ----------
@@ -113,5 +113,6 @@ def write_map(path, occupancy, origin, resolution):
     head = f"# Map size      : {width} x {height}\n# Resolution    : {resolution:g}\n"
     head += f"# Lower left    : {float(origin[0])!r} {float(origin[1])!r}\n"
     with whole_file(path) as stream:
-        stream.write(b"# Carnegie Mellon Robot Toolkit (CARMEN) map file\n" + head.encode() + MAP_LABEL)
+        stream.write(b"# Carnegie Mellon Robot Toolkit (CARMEN) map file\n")
+        stream.write(head.encode() + MAP_LABEL)
         stream.write(struct.pack("<Bi", GRIDMAP_CHUNK, len(chunk)) + chunk)

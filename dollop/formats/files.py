@@ -13,6 +13,7 @@ from pathlib import Path
 __all__ = ["FormatError", "check_writable", "from_file", "read_bytes", "warn_of", "whole_file"]
 
 MAX_BYTES = 1 << 30
+"""The most that is read of one file, unpacked: a small gzip can hold anything."""
 
 
 class FormatError(ValueError):
@@ -155,11 +156,12 @@ def whole_file(path, mode="wb"):
     Yields
     ------
     file object
+        To write into.
 
     Raises
     ------
     OSError
-        If it cannot be written; of what is raised while it is open, only the file's name is changed.
+        If it cannot be written; the error names the file, not its neighbour.
 
     Examples
     --------
@@ -190,5 +192,5 @@ def whole_file(path, mode="wb"):
 
 
 def _naming(path, error):
-    """The same error about the file that was to be written; the temporary one is nobody's concern."""
+    """The same error about the file that was to be written: the temporary one concerns nobody."""
     return type(error)(f"{path} cannot be written: {error.strerror or error}")

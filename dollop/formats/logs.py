@@ -17,21 +17,25 @@ def read_log(path, topic=None):
     Parameters
     ----------
     path : str or Path
-        `.log`, `.log.gz`, `.clf`: a CARMEN log (`dollop.formats.carmen_log.read_log`); `.bag`, `.mcap`
-        or the folder of a ROS 2 bag: a ROS bag (`dollop.formats.ros_bag.read_log`, which needs the
-        extra `ros`). A bag's poses are all (0, 0, 0): if the sensor moved, give the log its poses
-        in the map with `dataclasses.replace(log, poses=poses)`.
+        `.log`, `.clf`, packed (`.gz`) or not: a CARMEN log (`dollop.formats.carmen_log.read_log`);
+        `.bag`, `.mcap`, `.db3` or the folder of a ROS 2 bag: a ROS bag
+        (`dollop.formats.ros_bag.read_log`, which needs the extra `ros`). A bag's poses are all
+        (0, 0, 0): if the sensor moved, give the log its poses in the map with
+        `dataclasses.replace(log, poses=poses)`.
     topic : str, optional
         Which topic of a ROS bag; needed only if several carry laser scans.
 
     Returns
     -------
     LaserLog
+        `inf` where nothing came back, beam 0 rightmost.
 
     Raises
     ------
     FormatError
         If the file is not what its name says, or the name says nothing.
+    ValueError
+        If a topic is asked of a CARMEN log, which has none.
     FileNotFoundError
         If there is no such file.
     """
@@ -55,6 +59,13 @@ def write_log(path, log):
         `.log` or `.clf`, with `.gz` to have it packed; the file appears whole or not at all.
     log : LaserLog
         The scans, with evenly spaced beams.
+
+    Raises
+    ------
+    FormatError
+        If the name is not one of a CARMEN log.
+    ValueError
+        If the beams are not evenly spaced.
     """
     _check_is_carmen(Path(path))
     carmen_log.write_log(path, log)

@@ -1,8 +1,7 @@
-"""Maps of ROS map_server: a YAML of flat keys that names a picture
-(http://wiki.ros.org/map_server).
+"""Maps of ROS map_server: a YAML of flat keys that names a picture.
 
 Grey v of the picture, whose first row is the highest y, means the probability (255 - v) / 255,
-unless `negate`.
+unless `negate`; see http://wiki.ros.org/map_server.
 """
 
 import os
@@ -32,6 +31,9 @@ USUAL = {"mode": "trinary", "negate": 0, "occupied_thresh": 0.65, "free_thresh":
 def write_map(path, occupancy, origin, resolution):
     """Write a map as YAML with a PGM of the same name beside it; both appear, or neither.
 
+    Occupied, free and unknown cells come back as they were, in trinary mode of map_server
+    (http://wiki.ros.org/map_server); probabilities come back to a 255th.
+
     Parameters
     ----------
     path : str or Path
@@ -59,7 +61,7 @@ def write_map(path, occupancy, origin, resolution):
 
 
 def read_map(path):
-    """Read a map.
+    """Read a map as map_server does (http://wiki.ros.org/map_server).
 
     Parameters
     ----------
@@ -74,7 +76,7 @@ def read_map(path):
     origin : list of two float
         Lower left corner, x, y in m.
     resolution : float
-        m.
+        Side of a cell in m.
 
     Raises
     ------

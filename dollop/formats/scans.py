@@ -80,7 +80,7 @@ def usable_scans(path, scans, bad):
     and the scan after. Where at most one scan in twenty is out of order those are left out, with a
     warning. Otherwise the clock is worthless: all scans are kept, in the order of the file, and
     timed at 10 Hz, with the warning that speeds mean nothing. A jump forwards that lasts is only
-    warned of: either side of it is in order.
+    warned of: either side of it is in order. The limits are a reconstruction.
 
     Parameters
     ----------
@@ -102,6 +102,19 @@ def usable_scans(path, scans, bad):
     ------
     FormatError
         If there are too many broken and other scans.
+
+    Warns
+    -----
+    UserWarning
+        If scans were left out, or the clock is wrong.
+
+    Examples
+    --------
+    A single scan keeps its time, whatever it is.
+
+    >>> scan = Scan(Beams(1, 0.0, 1.0, 8.0), np.ones(1), (0, 0, 0), t=-3.5)
+    >>> usable_scans("a.log", {1: scan}, {})[1].tolist()
+    [-3.5]
     """
     beams = Counter(scan.beams for scan in scans.values()).most_common(1)[0][0]
     other = {place: scan.beams for place, scan in scans.items() if scan.beams != beams}
@@ -117,7 +130,7 @@ def forgive(path, bad, total):
 
     A log of at least 20 scans is read without its broken ones as long as they are no more than one
     in a hundred, or a single one. What is broken in more of them is taken to be the file's nature
-    and not an accident.
+    and not an accident. The limits are a reconstruction.
 
     Parameters
     ----------
@@ -132,6 +145,17 @@ def forgive(path, bad, total):
     ------
     FormatError
         With the first broken line, if there are too many of them.
+
+    Warns
+    -----
+    UserWarning
+        With their number and the first, if there are few.
+
+    Examples
+    --------
+    >>> forgive("a.log", {7: "cut off"}, 19)
+    Traceback (most recent call last):
+    dollop.formats.files.FormatError: a.log, line 7: cut off (1 of 19 scans are broken)
     """
     if not bad:
         return
@@ -176,7 +200,7 @@ def longest_rise(values):
 
 
 def _usable_clock(path, t):
-    """Which of the scans recorded at `t` (T,) stay (K,), and their times (K,): see `usable_scans`."""
+    """Which of the scans at times `t` (T,) stay, (K,), and their times (K,): see `usable_scans`."""
     keep = longest_rise(t)
     far = np.diff(t[keep], prepend=-np.inf, append=np.inf) > LONGEST_GAP
     stray = far[:-1] & far[1:]  # from both neighbours; the first and the last have but one
