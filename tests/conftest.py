@@ -2,6 +2,7 @@
 
 import pytest
 from hypothesis import settings
+from places import ROOT
 from walks import walk_figure_eights
 
 from dollop.laps import laps
@@ -19,7 +20,7 @@ def pytest_make_parametrize_id(val, argname):
 def pytest_collection_modifyitems(items):
     """Mark what proves the paper, so that who works on the method can leave it out: pytest -m "not replication"."""
     for item in items:
-        if "replication" in item.path.parts:
+        if "replication" in item.path.relative_to(ROOT).parts:
             item.add_marker(pytest.mark.replication)
 
 

@@ -101,6 +101,7 @@ def test_an_interrupt_ends_with_one_line(monkeypatch, capsys):
     assert capsys.readouterr().err.strip() == "dollop: stopped"
 
 
+@pytest.mark.replication
 @pytest.mark.parametrize("command", [["study"], ["study", "velocity", "--quick"], ["data"]])
 def test_a_missing_extra_is_named_before_the_work(command, monkeypatch, tmp_path):
     """Without PyBullet the replication says at once how to install it, and writes nothing."""
