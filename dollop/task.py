@@ -1,7 +1,7 @@
 """Tasks: learned from demonstrations, adapted to where the objects stand now, saved and loaded (Sec. IV-B and V)."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from dollop.association import Association, Frames, associate, associate_with_frames
 from dollop.cdhmm import SubgoalHMM
+from dollop.checks import check_positive, checked_array
 from dollop.environment import Environment
 from dollop.formats.files import FormatError, read_bytes, whole_file
 from dollop.laps import laps
@@ -52,8 +53,7 @@ class Demonstration:
         check_trajectories(self.trajectory)
 
     def __repr__(self):
-        walks = len(check_trajectories(self.trajectory))
-        return f"Demonstration of {walks} walks; {self.environment}"
+        return f"Demonstration of {len(check_trajectories(self.trajectory))} walks; {self.environment}"
 
     @classmethod
     def of(cls, observation, tolerance=0.02):
@@ -67,7 +67,8 @@ class Demonstration:
         if observation.user is None:
             raise ValueError("a demonstration needs a user, but nobody moved")
         t, positions = observation.user.t, observation.user.positions
-        return cls(laps(t, positions), observation.environment, float(np.median(np.diff(t))), tolerance)
+        sample_period = float(np.median(np.diff(t)))
+        return cls(laps(t, positions), observation.environment, sample_period, tolerance)
 
     @cached_property
     def law(self):
@@ -139,19 +140,17 @@ class Task:
         ValueError
             If the environments cannot be matched with confidence; the margin is named.
         """
-        matching = matching or match_confidently(
-            self.environment, environment, ("the task's environment", "the new one")
-        )
+        names = "the task's environment", "the new one"
+        matching = matching or match_confidently(self.environment, environment, names)
         start, *subgoals = self.association.relocate(environment, matching, turned)
         law = self.law.with_subgoals(subgoals, start, turned)
-        return replace(
-            self, law=law, environment=environment, association=self.association.carried(environment, matching)
-        )
+        tied = self.association.carried(environment, matching)
+        return replace(self, law=law, environment=environment, association=tied)
 
     def save(self, path):
         """Write the task as JSON, whole or not at all."""
         with whole_file(path, "w") as stream:
-            json.dump(as_dict(self), stream, indent=1)
+            json.dump(as_dict(self), stream, indent=1, default=np.ndarray.tolist)
             stream.write("\n")
 
     @classmethod
@@ -183,79 +182,62 @@ def anchors(law):
 
 
 def as_dict(task):
-    """The task as plain lists, for JSON."""
-    law, association = task.law, task.association
-    segments = [
-        {"goal": segment.goal.tolist()} | {name: getattr(segment.statistics, name).tolist() for name in ("G0", "G1")}
-        for segment in law.segments
-    ]
-    tied = {name: getattr(association, name).tolist() for name in ("corners", "weights", "differences")}
+    """What is saved of a task: names to numbers, lists and arrays, of which JSON makes lists."""
+    law, tied = task.law, task.association
     return {
         "format": FORMAT,
         "version": VERSION,
-        "boxes": task.environment.boxes.tolist(),
-        "start": law.start.tolist(),
-        "speeds": law.speeds.tolist(),
-        "segments": segments,
-        "association": tied,
+        "boxes": task.environment.boxes,
+        "start": law.start,
+        "speeds": law.speeds,
+        "segments": [{"goal": each.goal, **asdict(each.statistics)} for each in law.segments],
+        "association": {name: getattr(tied, name) for name in ("corners", "weights", "differences")},
         "demonstrations": [
             {
-                "walks": [walk.tolist() for walk in check_trajectories(shown.trajectory)],
-                "boxes": shown.environment.boxes.tolist(),
-                "sample_period": shown.sample_period,
-                "tolerance": shown.tolerance,
+                "walks": check_trajectories(each.trajectory),
+                "boxes": each.environment.boxes,
+                "sample_period": each.sample_period,
+                "tolerance": each.tolerance,
             }
-            for shown in task.demonstrations
+            for each in task.demonstrations
         ],
     }
 
 
 def from_dict(content):
-    """A task from what `as_dict` made."""
-    environment = Environment(np.array(content["boxes"], float))
-    segments = tuple(
-        LDS(Statistics(np.array(segment["G0"], float), np.array(segment["G1"], float)), segment["goal"])
-        for segment in content["segments"]
-    )
-    tied = content["association"]
-    association = Association(
-        environment,
-        np.array(tied["corners"], int),
-        np.array(tied["weights"], float),
-        np.array(tied["differences"], float),
-    )
-    law = SequencedLDS(segments, np.array(content["start"], float), np.array(content["speeds"], float))
-    check_shapes(law, association)
-    shown = tuple(
-        Demonstration(
-            [np.array(walk, float) for walk in each["walks"]],
-            Environment(np.array(each["boxes"], float)),
-            each["sample_period"],
-            each["tolerance"],
-        )
-        for each in content["demonstrations"]
-    )
+    """A task from what JSON makes of `as_dict`; ValueError where its parts do not fit together."""
+    environment, segments = Environment(content["boxes"]), content["segments"]
+    check_positive("the number of segments", len(segments))
+    start = checked_array("start", content["start"], 2)
+    speeds = checked_array("speeds", content["speeds"], len(segments))
+    check_positive("speeds", speeds.min())
+    law = SequencedLDS(tuple(map(segment_from, segments)), start, speeds)
+    association = association_from(content["association"], environment, len(segments) + 1)
+    shown = tuple(map(demonstration_from, content["demonstrations"]))
     return Task(law, environment, association, demonstrations=shown)
 
 
-def check_shapes(law, association):
-    """Raise ValueError where the parts of a loaded task do not fit together."""
-    places, ties = len(law.segments) + 1, association.corners.shape
-    if law.speeds.shape != (places - 1,) or law.start.shape != (2,) or not law.segments:
-        raise ValueError(
-            f"one speed per segment and one start are needed, got {law.speeds.shape} and {law.start.shape}"
-        )
-    if ties[0] != places or association.weights.shape != ties or association.differences.shape != (*ties, 2):
-        raise ValueError(f"the association must tie {places} places, got shapes {ties} and {association.weights.shape}")
-    if not 0 <= association.corners.min() <= association.corners.max() < len(association.environment.corners):
-        raise ValueError(f"corners must be 0 to {len(association.environment.corners) - 1}")
-    numbers = [law.start, law.speeds, law.subgoals, association.weights, association.differences]
-    if not all(np.isfinite(number).all() for number in numbers):
-        raise ValueError("every number must be finite")
-    if not (law.speeds > 0).all():
-        raise ValueError(f"speeds must be positive, got {law.speeds.min()}")
-    if (association.weights < 0).any():
-        raise ValueError(f"weights must not be negative, got {association.weights.min()}")
+def segment_from(content):
+    """A saved LDS."""
+    G0, G1 = (checked_array(name, content[name], 2, 2) for name in ("G0", "G1"))
+    return LDS(Statistics(G0, G1), content["goal"])
+
+
+def association_from(content, environment, places):
+    """The saved association of so many places with the corners of an environment."""
+    corners = checked_array("corners", content["corners"], places, "m").astype(int)
+    weights = checked_array("weights", content["weights"], *corners.shape)
+    differences = checked_array("differences", content["differences"], *corners.shape, 2)
+    if not 0 <= corners.min() <= corners.max() < len(environment.corners):
+        raise ValueError(f"corners must be 0 to {len(environment.corners) - 1}")
+    check_positive("weights", weights.min(), or_zero=True)
+    return Association(environment, corners, weights, differences)
+
+
+def demonstration_from(content):
+    """A saved demonstration."""
+    walks, environment = check_trajectories(content["walks"]), Environment(content["boxes"])
+    return Demonstration(walks, environment, content["sample_period"], content["tolerance"])
 
 
 def learn(demonstrations, environment=None, spread=0.15):
@@ -287,59 +269,70 @@ def learn(demonstrations, environment=None, spread=0.15):
     demonstrations = tuple(demonstrations)
     if not demonstrations:
         raise ValueError("learning needs at least one demonstration, got none")
-    check_laws(demonstrations)
     environment = demonstrations[0].environment if environment is None else environment
-    matchings = [matching_to(environment, demonstration, k) for k, demonstration in enumerate(demonstrations)]
-    pairs = list(zip(demonstrations, matchings, strict=True))
-    mapped = [Task.of(shown).adapt(environment, matching).law for shown, matching in pairs]
-    model = SubgoalHMM.fit([law.subgoals for law in mapped], spread)
+    mapped = [mapped_to(environment, shown, k) for k, shown in enumerate(demonstrations)]
+    laws, centres = zip(*mapped, strict=True)
+    model = SubgoalHMM.fit([law.subgoals for law in laws], spread)
     members = members_along(model)
-    association = tie_to_objects(environment, pairs, members)
-    law = shared_law(model, mapped, members, association.relocate(environment))
+    association = tie_to_objects(environment, demonstrations, centres, members)
+    law = shared_law(laws, members, association.relocate(environment))
     return Task(law, environment, association, model, demonstrations)
 
 
-def check_laws(demonstrations):
-    """Raise ValueError that names the demonstration that cannot be segmented."""
-    for number, demonstration in enumerate(demonstrations):
-        try:
-            demonstration.law  # noqa: B018
-        except ValueError as error:
-            raise ValueError(f"demonstration {number}: {error}") from error
+def mapped_to(environment, demonstration, number):
+    """The law of a demonstration in the environment to learn in, and where its objects stood.
 
-
-def matching_to(environment, demonstration, number):
-    """The matching from demonstration `number` to the environment to learn in."""
-    return match_confidently(demonstration.environment, environment, (f"demonstration {number}", "the one to learn in"))
+    That is (N, 2) centres in m in the order of the environment, nan for an object that was not
+    there.
+    """
+    names = f"demonstration {number}", "the one to learn in"
+    try:
+        task = Task.of(demonstration)
+    except ValueError as error:
+        raise ValueError(f"{names[0]}: {error}") from error
+    matching = match_confidently(task.environment, environment, names)
+    centres, partners = np.full((len(environment), 2), np.nan), matching.partners
+    centres[partners[partners >= 0]] = task.environment.centres[partners >= 0]
+    return task.adapt(environment, matching).law, centres
 
 
 def members_along(model):
-    """Which segments of which demonstrations run along each edge of the most-likely path, from the start on."""
-    path, segments = model.most_likely_path().tolist(), model.segments()
-    return [segments[edge] for edge in pairwise([-1, *path])]
-
-
-def shared_law(model, laws, members, places):
-    """One LDS for all segments that run along the same edge of the most-likely path (Sec. V).
+    """Which segments of which demonstrations run along each edge of the most-likely path (Sec. V).
 
     Parameters
     ----------
     model : SubgoalHMM
-    laws : list of SequencedLDS
+
+    Returns
+    -------
+    list of K lists of (demonstration, segment)
+        From the start on.
+    """
+    path, segments = model.most_likely_path().tolist(), model.segments()
+    return [segments[edge] for edge in pairwise([-1, *path])]
+
+
+def shared_law(laws, members, places):
+    """One LDS for all segments that run along the same edge of the most-likely path (Sec. V).
+
+    Parameters
+    ----------
+    laws : sequence of SequencedLDS
         Of each demonstration.
     members : list of K lists of (demonstration, segment)
     places : (K + 1, 2) float array
         Where the law is to start, and its subgoals, m.
     """
-    pooled = model.pooled([[segment.statistics for segment in law.segments] for law in laws])
-    edges = pairwise([-1, *model.most_likely_path().tolist()])
-    segments = tuple(LDS(pooled[edge], goal) for edge, goal in zip(edges, places[1:], strict=True))
-    speeds = np.array([np.mean([laws[d].speeds[i] for d, i in shared]) for shared in members])
-    return SequencedLDS(segments, places[0], speeds)
+    segments, speeds = [], []
+    for shared, goal in zip(members, places[1:], strict=True):
+        first, *others = [laws[d].segments[i].statistics for d, i in shared]
+        segments.append(LDS(sum(others, first), goal))
+        speeds.append(np.mean([laws[d].speeds[i] for d, i in shared]))
+    return SequencedLDS(tuple(segments), places[0], np.array(speeds))
 
 
-def tie_to_objects(environment, pairs, members):
-    """Association of the learned start and subgoals with the objects, by closeness and by how little they vary.
+def tie_to_objects(environment, demonstrations, centres, members):
+    """Association of start and subgoals with objects, by closeness and by how little they vary.
 
     Each place is seen from the objects as they stood in every demonstration that went there.
 
@@ -347,8 +340,9 @@ def tie_to_objects(environment, pairs, members):
     ----------
     environment : Environment
         N objects, the one to learn in.
-    pairs : list of (Demonstration, Matching)
-        With the matching into `environment`.
+    demonstrations : sequence of Demonstration
+    centres : sequence of (N, 2) float arrays
+        Where these objects stood in each demonstration, in m.
     members : list of K lists of (demonstration, segment)
         Which segments end in each subgoal.
 
@@ -357,28 +351,24 @@ def tie_to_objects(environment, pairs, members):
     Association
         Of K + 1 places.
     """
-    demonstrated = [anchors(shown.law) for shown, _ in pairs]
-    centres = [centres_in(environment, shown.environment, matching) for shown, matching in pairs]
-    places = [[(d, 0) for d, i in members[0] if i == 0] or [(0, 0)], *([(d, i + 1) for d, i in m] for m in members)]
-    ties = [tie(environment, [(demonstrated[d][i], centres[d]) for d, i in seen]) for seen in places]
+    demonstrated = [anchors(shown.law) for shown in demonstrations]
+    starts = [(d, -1) for d, i in members[0] if i == 0] or [(0, -1)]
+    ties = [tie(environment, demonstrated, centres, seen) for seen in (starts, *members)]
     corners = np.tile(np.arange(4 * len(environment)), (len(ties), 1))
-    weights, differences = (np.stack(column) for column in zip(*ties, strict=True))
-    return Association(environment, corners, weights, differences)
+    return Association(environment, corners, *map(np.stack, zip(*ties, strict=True)))
 
 
-def centres_in(environment, shown, matching):
-    """Centres (N, 2) of the objects of another environment in this one's order, `nan` where there is none."""
-    centres = np.full((len(environment), 2), np.nan)
-    partners = matching.partners
-    centres[partners[partners >= 0]] = shown.centres[partners >= 0]
-    return centres
+def tie(environment, demonstrated, centres, seen):
+    """Weights (4N,) and differences (4N, 2) to all corners of one place.
 
-
-def tie(environment, seen):
-    """Weights (4N,) and differences (4N, 2) to all corners of one place, `seen` several times as (place, centres)."""
-    common = np.isfinite([centres[:, 0] for _, centres in seen]).all(axis=0)
-    frames = [Frames(centres[common], np.zeros(common.sum())) for _, centres in seen]
-    found = associate_with_frames([[place] for place, _ in seen], frames)
+    It is where `seen`, segments as (demonstration, segment), end; the start is where segment -1
+    does.
+    """
+    places = [[demonstrated[d][i + 1]] for d, i in seen]
+    stood = np.array([centres[d] for d, _ in seen])
+    common = np.isfinite(stood[..., 0]).all(axis=0)
+    frames = [Frames(each[common], np.zeros(common.sum())) for each in stood]
+    found = associate_with_frames(places, frames)
     weights, local = np.zeros(len(environment)), np.zeros((len(environment), 2))
     weights[common], local[common] = found.weights[:, 0], found.local[:, 0]
     return np.repeat(weights / 4, 4), np.repeat(local, 4, axis=0) - environment.corner_offsets

@@ -194,6 +194,8 @@ class SubgoalHMM:
     def segments(self):
         """Which segments of which demonstrations run along each edge (Sec. V).
 
+        Their statistics add up (`dollop.lds.Statistics`), so that one LDS describes all of an edge.
+
         Returns
         -------
         dict
@@ -205,36 +207,6 @@ class SubgoalHMM:
             for segment, edge in enumerate(pairwise([-1, *states.tolist()])):
                 edges.setdefault(edge, []).append((demonstration, segment))
         return edges
-
-    def pooled(self, statistics):
-        """Add up what the segments along each edge have: one LDS describes all of them (Sec. V).
-
-        Parameters
-        ----------
-        statistics : sequence of sequences
-            `statistics[demonstration][segment]`, anything additive, for instance
-            `dollop.lds.Statistics`.
-
-        Returns
-        -------
-        dict
-            (from state, to state) to the sum over the segments along that edge; from -1 is from the
-            start.
-
-        Raises
-        ------
-        ValueError
-            Other numbers of demonstrations or segments than those of `sequences`.
-        """
-        given, held = [len(each) for each in statistics], [len(each) for each in self.sequences]
-        if given != held:
-            rule = f"one entry per segment, {held} by demonstration"
-            raise ValueError(f"statistics must have {rule}, got {given}")
-        sums = {}
-        for edge, members in self.segments().items():
-            first, *others = [statistics[d][i] for d, i in members]
-            sums[edge] = sum(others, first)
-        return sums
 
     def states_of(self, sequence):
         """The states of another demonstration's subgoals: those that raise the evidence most.
