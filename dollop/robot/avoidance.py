@@ -407,6 +407,5 @@ def signed_distance(blocked, resolution):
     """Distances (H, W) in m from cells' centres to the edge of what is blocked, negative inside."""
     if not blocked.any():
         return np.full(blocked.shape, 1e3)
-    outside = scipy.ndimage.distance_transform_edt(~blocked)
-    inside = scipy.ndimage.distance_transform_edt(blocked)
+    outside, inside = map(scipy.ndimage.distance_transform_edt, (~blocked, blocked))
     return resolution * (outside - inside - np.where(blocked, -0.5, 0.5))

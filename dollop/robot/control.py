@@ -131,7 +131,7 @@ class Guidance:
         self.detours, self._geodesics = {}, {}
 
     def direction(self, k, x, y):
-        """Direction in which a segment sends a robot.
+        """Direction in which a segment sends a robot (Sec. III).
 
         Parameters
         ----------

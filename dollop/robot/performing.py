@@ -207,15 +207,13 @@ class Search:
 
     def command(self, touching):
         """v in m/s and omega in rad/s, by whether the robot touches something."""
-        if touching:
-            self.off, self.pushed = 0.0, self.pushed + self.period
-            if self.pushed > PUSHED:
-                self.speed, self.pushed = -self.speed, 0.0
-        elif self.off < HELD:
-            self.off += self.period
-        else:
+        if self.off >= HELD and not touching:
             self.speed, self.pushed = -BACK_OFF, 0.0
             return 0.0, SEARCH_TURN
+        self.off = 0.0 if touching else self.off + self.period
+        self.pushed += self.period if touching else 0.0
+        if self.pushed > PUSHED:
+            self.speed, self.pushed = -self.speed, 0.0
         return self.speed, 0.0
 
 
