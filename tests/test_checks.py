@@ -73,7 +73,7 @@ def test_positions_lie_in_the_plane_and_on_this_planet():
     assert checked_positions("walk", np.empty((0, 2))).shape == (0, 2)
     with pytest.raises(ValueError, match=r"^walk must have shape \(N, 2\), got \(1, 3\)$"):
         checked_positions("walk", [[0, 1, 2]])
-    with pytest.raises(ValueError, match="^walk must lie within 1e.09 m of the origin, got 1e.10 m$"):
+    with pytest.raises(ValueError, match="^walk must lie within 1e.09 m of .*, got 1e.10 m$"):
         checked_positions("walk", [[0.0, -1e10]])
 
 

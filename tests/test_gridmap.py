@@ -25,8 +25,10 @@ def room_log(poses, max_range=8.0, beams=361):
     bearings = poses[:, 2, None] + angles
     directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
     walls = np.where(directions > 0, ROOM[:, 1], ROOM[:, 0]) - poses[:, None, :2]
-    ranges = np.min(walls / np.where(directions == 0, 1e-9, directions), axis=-1, where=directions != 0, initial=np.inf)
-    return LaserLog(np.arange(len(poses)) / 10, np.where(ranges > max_range, np.inf, ranges), angles, poses, max_range)
+    reach = walls / np.where(directions == 0, 1e-9, directions)
+    ranges = np.min(reach, axis=-1, where=directions != 0, initial=np.inf)
+    ranges = np.where(ranges > max_range, np.inf, ranges)
+    return LaserLog(np.arange(len(poses)) / 10, ranges, angles, poses, max_range)
 
 
 POSES = [(x, y, heading) for x in (-1.0, 0.52, 2.0) for y in (-0.5, 1.03) for heading in (0.1, 1.2)]
@@ -40,7 +42,10 @@ def distance_to_walls(points):
 
 
 def test_room_is_recovered():
-    """The walls, all of them and nothing else, are occupied; the inside is free, the outside unknown."""
+    """The walls, all of them and nothing else, are occupied.
+
+    The inside is free, the outside unknown.
+    """
     grid = OccupancyGrid.from_log(room_log(POSES), resolution=0.05)
     rows_cols = np.argwhere(np.ones(grid.occupancy.shape))
     distance, occupied = distance_to_walls(grid.cell_centres(rows_cols)), grid.occupied.ravel()
@@ -48,7 +53,8 @@ def test_room_is_recovered():
     along = np.linspace(0, 1, 200)[:, None]
     (left, right), (low, high) = ROOM
     corners = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
-    outline = np.concatenate([a + along * (b - a) for a, b in zip(corners, corners[1:], strict=False)])
+    sides = zip(corners[:-1], corners[1:], strict=True)
+    outline = np.concatenate([a + along * (b - a) for a, b in sides])
     assert grid.distance_at(outline * 0.9999).max() <= 0.1
     centres = grid.cell_centres(rows_cols)
     inside = ((centres > ROOM[:, 0] + 0.1) & (centres < ROOM[:, 1] - 0.1)).all(axis=1)
@@ -58,7 +64,7 @@ def test_room_is_recovered():
 
 
 def test_world_frame_does_not_matter():
-    """Shifting all poses by whole cells shifts the grid's origin and leaves the cells as they are."""
+    """Shifting all poses by whole cells shifts the grid's origin; the cells stay as they are."""
     log = room_log(POSES)
     moved = LaserLog(log.t, log.ranges, log.angles, log.poses + [64.0, -32.0, 0.0], log.max_range)
     grid, other = OccupancyGrid.from_log(log, 0.0625), OccupancyGrid.from_log(moved, 0.0625)
@@ -67,7 +73,10 @@ def test_world_frame_does_not_matter():
 
 
 def test_what_passes_is_swept_away():
-    """Something seen for a fifth of the time leaves no occupied cell, something seen for most of it does."""
+    """Something seen for a fifth of the time leaves no occupied cell.
+
+    If for most of it, it does.
+    """
     for share, stays in ((0.2, False), (0.8, True)):
         log = room_log([(0.0, 0.0, 0.0)] * 40)
         ranges = log.ranges.copy()
@@ -87,7 +96,7 @@ def test_beams_without_return_clear_up_to_the_maximum_range():
 
 
 def test_oversized_grid_is_refused():
-    """A pose astray far enough to ask for billions of cells is an error with the size, not a crash."""
+    """A pose so far astray that it asks for billions of cells is an error; it tells the size."""
     with pytest.raises(ValueError, match="are more than 100000000"):
         OccupancyGrid.from_log(room_log([(0, 0, 0), (1, 1, 0)]), resolution=1e-5)
 
@@ -122,7 +131,10 @@ ORIGINS = st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
 @settings(max_examples=60)
 @given(GRIDS, ORIGINS, st.sampled_from([0.05, 0.1, 0.025]), st.sampled_from([".map", ".yaml"]))
 def test_save_load_round_trip(occupancy, origin, resolution, suffix):
-    """Occupied, free and unknown cells come back as they were, probabilities to the format's precision."""
+    """Occupied, free and unknown cells come back as they were.
+
+    Probabilities to the format's precision.
+    """
     grid = OccupancyGrid(occupancy, origin, resolution)
     with tempfile.TemporaryDirectory() as folder:
         grid.save(Path(folder) / f"a{suffix}")
@@ -136,7 +148,10 @@ def test_save_load_round_trip(occupancy, origin, resolution, suffix):
 
 @given(GRIDS)
 def test_distance_field_is_brute_force(occupancy):
-    """The distance field is the smallest distance between cell centres, and inf where nothing is occupied."""
+    """The distance field is the smallest distance between cell centres.
+
+    Inf if nothing is occupied.
+    """
     grid = OccupancyGrid(occupancy, (1.0, 2.0), 0.1)
     centres = grid.cell_centres(np.argwhere(np.ones(occupancy.shape)))
     obstacles = grid.cell_centres(np.argwhere(grid.occupied))
@@ -147,7 +162,10 @@ def test_distance_field_is_brute_force(occupancy):
 
 
 def test_cells_and_points():
-    """A cell's centre lies in that cell; rows go with y, columns with x; off the map the distance is NaN."""
+    """A cell's centre lies in that cell.
+
+    Rows go with y, columns with x; off the map the distance is NaN.
+    """
     grid = OccupancyGrid(np.zeros((3, 5)), (10.0, -20.0), 0.5)
     cells = np.argwhere(np.ones((3, 5)))
     np.testing.assert_array_equal(grid.world_to_cell(grid.cell_centres(cells)), cells)
@@ -174,11 +192,12 @@ def test_cells_and_points():
 def test_bad_values_are_named(change, message):
     """What is no grid of probabilities is refused with the value and the rule."""
     with pytest.raises(ValueError, match=message):
-        OccupancyGrid(**({"occupancy": [[0.0, 1.0]], "origin": (0.0, 0.0), "resolution": 0.05} | change))
+        good = {"occupancy": [[0.0, 1.0]], "origin": (0.0, 0.0), "resolution": 0.05}
+        OccupancyGrid(**(good | change))
 
 
 def test_maps_by_suffix(tmp_path):
-    """Other names are refused, on reading and on writing, and a picture that is missing is named."""
+    """Other names are refused, on reading and on writing; a picture that is missing is named."""
     grid = OccupancyGrid([[0.0, 1.0]], (0.0, 0.0), 0.05)
     with pytest.raises(FormatError, match="a map is named .yaml"):
         grid.save(tmp_path / "a.png")
@@ -190,20 +209,27 @@ def test_maps_by_suffix(tmp_path):
         OccupancyGrid.load(tmp_path / "a.yaml")
 
 
+EDITS = st.tuples(st.integers(0, 10**6), st.integers(0, 2), st.binary(max_size=6))
+
+
 @settings(max_examples=200)
 @given(
     name=st.sampled_from(["a.map", "a.yaml", "a.pgm"]),
-    edits=st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 2), st.binary(max_size=6)), min_size=1, max_size=4),
+    edits=st.lists(EDITS, min_size=1, max_size=4),
 )
 def test_damaged_maps_never_fail_in_the_depth(name, edits):
-    """Whatever is overwritten, inserted or cut off in a map's files: a grid or a FormatError, and nothing else."""
+    """Whatever is overwritten, inserted or cut off in a map's files.
+
+    A grid or a FormatError, and nothing else.
+    """
     with tempfile.TemporaryDirectory() as folder:
         main = Path(folder) / name.replace(".pgm", ".yaml")
         OccupancyGrid([[0.0, 1.0, np.nan], [0.3, 0.7, 0.1]], (1.5, -2.0), 0.05).save(main)
         content = (Path(folder) / name).read_bytes()
         for place, action, piece in edits:
             place %= len(content) + 1
-            content = content[:place] + piece + content[{0: place + len(piece), 1: place, 2: len(content)}[action] :]
+            end = {0: place + len(piece), 1: place, 2: len(content)}[action]
+            content = content[:place] + piece + content[end:]
         (Path(folder) / name).write_bytes(content)
         try:
             assert OccupancyGrid.load(main).occupancy.size > 0
@@ -211,10 +237,13 @@ def test_damaged_maps_never_fail_in_the_depth(name, edits):
             assert folder in str(error)
 
 
-@pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA is not set")
+@pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="no recordings")
 @pytest.mark.filterwarnings("ignore:.*clock")
 def test_real_building():
-    """The grid of the Intel lab explains its own scans: nearly all readings lie within 10 cm of an occupied cell."""
+    """The grid of the Intel lab explains its own scans.
+
+    Nearly all readings lie within 10 cm of an occupied cell.
+    """
     log = read_log(Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / "carmen_logs/intel-corrected.log.gz")
     grid = OccupancyGrid.from_log(log)
     scan, beam = np.nonzero(log.ranges < 20)
@@ -228,7 +257,10 @@ def test_real_building():
 
 @pytest.mark.parametrize("heading", [0.3, 2.0, -2.5])
 def test_counts_are_those_of_one_beam_at_a_time(heading):
-    """A laser that sees half of a plane: every cell holds hits / (hits + passes), beam by beam and step by step."""
+    """A laser that sees half of a plane.
+
+    Every cell holds hits / (hits + passes), beam by beam and step by step.
+    """
     rng, golden, resolution = np.random.default_rng(1), (np.sqrt(5) - 1) / 2, 0.1
     ranges = rng.uniform(0.05, 4.0, (5, 31))
     ranges[rng.random(ranges.shape) < 0.2] = np.inf
@@ -239,12 +271,15 @@ def test_counts_are_those_of_one_beam_at_a_time(heading):
     counts = np.zeros((*grid.occupancy.shape, 2))
     for scan, (x, y, theta) in enumerate(poses):
         for beam, reach in enumerate(ranges[scan]):
-            way, hit = np.array([np.cos(theta + log.angles[beam]), np.sin(theta + log.angles[beam])]), reach <= 3.0
+            bearing, hit = theta + log.angles[beam], reach <= 3.0
+            way = np.array([np.cos(bearing), np.sin(bearing)])
             if hit:
                 counts[(*grid.world_to_cell([x, y] + reach * way), 0)] += 1
             for step in range(int(min(reach, 3.0) / resolution - np.sqrt(2) * hit)):
-                counts[(*grid.world_to_cell([x, y] + (step + scan * golden % 1) * resolution * way), 1)] += 1
+                along = (step + scan * golden % 1) * resolution
+                counts[(*grid.world_to_cell([x, y] + along * way), 1)] += 1
     with np.errstate(invalid="ignore"):
         np.testing.assert_allclose(grid.occupancy, counts[..., 0] / counts.sum(axis=-1))
     seen = grid.cell_centres(np.argwhere(~grid.unknown))
-    assert np.ptp(seen, axis=0).max() + 6 * resolution > np.multiply(grid.occupancy.shape, resolution).max()
+    size = np.multiply(grid.occupancy.shape, resolution).max()
+    assert np.ptp(seen, axis=0).max() + 6 * resolution > size

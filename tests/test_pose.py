@@ -33,10 +33,14 @@ def test_the_ends_of_the_range():
 
 @given(ANGLES, ANGLES)
 def test_rotations_are_those_of_complex_numbers(angle, other):
-    """Multiplying by exp(i angle); one after the other is their sum, and the inverse the transpose."""
+    """Multiplying by exp(i angle).
+
+    One after the other is their sum, and the inverse the transpose.
+    """
     turned = rotation(angle) @ [3.0, 4.0]
     assert turned @ [1, 1j] == pytest.approx((3 + 4j) * np.exp(1j * angle))
-    np.testing.assert_allclose(rotation(angle) @ rotation(other), rotation(angle + other), atol=1e-9)
+    both = rotation(angle) @ rotation(other)
+    np.testing.assert_allclose(both, rotation(angle + other), atol=1e-9)
     np.testing.assert_allclose(rotation(angle) @ rotation(angle).T, np.eye(2), atol=1e-12)
 
 

@@ -11,13 +11,14 @@ import pytest
 from dollop.formats import carmen_map
 from dollop.formats.files import FormatError
 
-external = pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA is not set")
+external = pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="no recordings")
 
 
 def map_file(cells, chunks=b"", kind=1, name=b"", size=None):
     """A map file as CARMEN writes it, of (width, height) cells of 0.1 m."""
     width, height = cells.shape
-    chunk = b"GRIDMAP   " + name + struct.pack("<iif", width, height, 0.1) + cells.astype("<f4").tobytes()
+    chunk = b"GRIDMAP   " + name + struct.pack("<iif", width, height, 0.1)
+    chunk += cells.astype("<f4").tobytes()
     head = b"# Map size : 2 x 3\n#\nCARMENMAPFILEv020"
     return head + chunks + struct.pack("<Bi", kind, len(chunk) if size is None else size) + chunk
 
@@ -26,9 +27,13 @@ CELLS = np.array([[0.0, 0.5, -1.0], [1.0, 0.25, 0.75]])
 
 
 def test_map_is_read_by_rows_of_y(tmp_path):
-    """Cell [x][y] of the file is row y, column x; -1 is unknown; other chunks and the chunk's name are passed over."""
+    """Cell [x][y] of the file is row y, column x.
+
+    -1 is unknown; other chunks and the chunk's name are passed over.
+    """
     other = struct.pack("<Bi", 32, 4) + b"abcd"
-    for content in (map_file(CELLS, other), gzip.compress(map_file(CELLS, kind=129, name=b"floor\0"))):
+    packed = gzip.compress(map_file(CELLS, kind=129, name=b"floor\0"))
+    for content in (map_file(CELLS, other), packed):
         (tmp_path / "a.map").write_bytes(content)
         occupancy, origin, resolution = carmen_map.read_map(tmp_path / "a.map")
         np.testing.assert_array_equal(occupancy, [[0.0, 1.0], [0.5, 0.25], [np.nan, 0.75]])
@@ -59,7 +64,10 @@ def test_what_is_no_map(tmp_path, content, message):
 @external
 @pytest.mark.parametrize(("name", "shape"), [("wean5300", (326, 657)), ("thickwean", (170, 477))])
 def test_real_maps(name, shape):
-    """The maps of the paper's own era are read: decimetre cells, mostly unknown, a few per cent occupied."""
+    """The maps of the paper's own era are read.
+
+    Decimetre cells, mostly unknown, a few per cent occupied.
+    """
     path = Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / f"carmen_maps/{name}.map"
     occupancy, _, resolution = carmen_map.read_map(path)
     assert occupancy.shape == shape and resolution == 0.1

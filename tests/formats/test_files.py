@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from dollop.formats import files
-from dollop.formats.files import FormatError, check_writable, from_file, read_bytes, warn_of, whole_file
+from dollop.formats.files import (
+    FormatError,
+    check_writable,
+    from_file,
+    read_bytes,
+    warn_of,
+    whole_file,
+)
 
 
 def test_error_names_file_and_line():
@@ -39,20 +46,32 @@ def test_whole_file_replaces(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
 
 
-@pytest.mark.parametrize(("name", "kind"), [("none/a.txt", FileNotFoundError), ("folder", IsADirectoryError)])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("none/a.txt", FileNotFoundError), ("folder", IsADirectoryError)],
+)
 def test_what_cannot_be_written_is_named(tmp_path, name, kind):
-    """Before the work and while writing, the error names the target, never a temporary file, and leaves nothing."""
+    """Before the work and while writing, the error names the target.
+
+    No temporary file is named or left.
+    """
     (tmp_path / "folder").mkdir()
     for write in (check_writable, lambda path: whole_file(path).__enter__()):
         with pytest.raises(kind) as caught:
             write(tmp_path / name)
-        assert str(caught.value).startswith(f"{tmp_path / name} cannot be written: ") and "/." not in str(caught.value)
-    assert [p.name for p in tmp_path.iterdir()] == ["folder"] and check_writable(tmp_path / "a.txt") is None
+        said = str(caught.value)
+        assert said.startswith(f"{tmp_path / name} cannot be written: ") and "/." not in said
+    assert [p.name for p in tmp_path.iterdir()] == ["folder"]
+    assert check_writable(tmp_path / "a.txt") is None
 
 
 def test_a_full_disk_is_told_with_the_name(tmp_path):
-    """An error of writing has no name of its own, and gets the target's; one about another file keeps its own."""
-    with pytest.raises(OSError, match=r"a\.txt cannot be written: No space left"), whole_file(tmp_path / "a.txt"):
+    """An error of writing has no name of its own, and gets the target's.
+
+    One about another file keeps its own.
+    """
+    text = r"a\.txt cannot be written: No space left"
+    with pytest.raises(OSError, match=text), whole_file(tmp_path / "a.txt"):
         raise OSError(errno.ENOSPC, "No space left on device")
     with pytest.raises(FileNotFoundError, match="other"), whole_file(tmp_path / "a.txt"):
         (tmp_path / "other").read_bytes()

@@ -26,16 +26,22 @@ def scans_of(store, ranges=RANGES, step=0.5, count=3):
     types, ros1 = store.types, "seq" in store.types["std_msgs/msg/Header"].__dataclass_fields__
     for i in range(count):
         stamp = types["builtin_interfaces/msg/Time"](sec=100, nanosec=i * 100_000_000)
-        header = types["std_msgs/msg/Header"](**({"seq": i} if ros1 else {}), stamp=stamp, frame_id="laser")
+        number = {"seq": i} if ros1 else {}
+        header = types["std_msgs/msg/Header"](**number, stamp=stamp, frame_id="laser")
         values, none = np.array(ranges, np.float32), np.array([], np.float32)
-        yield types[SCAN](header, -1.0, -1.0 + step * (len(ranges) - 1), step, 0.0, 0.1, 0.1, 8.0, values, none)
+        bearings = -1.0, -1.0 + step * (len(ranges) - 1), step
+        yield types[SCAN](header, *bearings, 0.0, 0.1, 0.1, 8.0, values, none)
 
 
 def write_bag(path, version, topics, beside=None):
-    """A bag of the given scans per topic, in ROS `version` ("1", "2" or "mcap"), and maybe another (topic, type)."""
+    """A bag of the given scans per topic, and maybe another (topic, type).
+
+    `version` is "1", "2" or "mcap".
+    """
     store = get_typestore(Stores.ROS1_NOETIC if version == "1" else Stores.ROS2_HUMBLE)
     plugin = StoragePlugin.MCAP if version == "mcap" else StoragePlugin.SQLITE3
-    with Writer1(path) if version == "1" else Writer2(path, version=8, storage_plugin=plugin) as bag:
+    writer = Writer1(path) if version == "1" else Writer2(path, version=8, storage_plugin=plugin)
+    with writer as bag:
         serialize = store.serialize_ros1 if version == "1" else store.serialize_cdr
         for topic, messages in topics.items():
             connection = bag.add_connection(topic, SCAN, typestore=store)
@@ -48,7 +54,10 @@ def write_bag(path, version, topics, beside=None):
 
 @pytest.mark.parametrize(("name", "version"), [("a.bag", "1"), ("folder", "2"), ("folder", "mcap")])
 def test_scans_of_every_kind_of_bag(tmp_path, name, version):
-    """ROS 1, ROS 2 (sqlite) and mcap give the same log: too near, too far and NaN are no returns, the pose is zero."""
+    """ROS 1, ROS 2 (sqlite) and mcap give the same log.
+
+    Too near, too far and NaN are no returns, the pose is zero.
+    """
     log = read_log(write_bag(tmp_path / name, version, {"/scan": scans_of}))
     np.testing.assert_array_equal(log.ranges, [[np.inf, 1, 2, np.inf, np.inf, np.inf]] * 3)
     np.testing.assert_allclose(log.angles, -1 + 0.5 * np.arange(6))
@@ -73,8 +82,9 @@ def test_laser_turning_clockwise(tmp_path):
 
 
 def test_topics_are_listed(tmp_path):
-    """With several scan topics one must be named, and a wrong name is answered with the right ones."""
-    path = write_bag(tmp_path / "a.bag", "1", {"/left": scans_of, "/right": lambda s: scans_of(s, [4.0])})
+    """With several scan topics one must be named; a wrong name is answered with the right ones."""
+    topics = {"/left": scans_of, "/right": lambda store: scans_of(store, [4.0])}
+    path = write_bag(tmp_path / "a.bag", "1", topics)
     with pytest.raises(FormatError, match="name one LaserScan topic; the bag has /left, /right"):
         read_log(path)
     with pytest.raises(FormatError, match="no LaserScan topic '/scan'; the bag has /left, /right"):
@@ -87,23 +97,39 @@ TRANSFORMS = "tf2_msgs/msg/TFMessage"
 
 @pytest.mark.parametrize(
     ("topic", "kind", "warns"),
-    [("/odom", "nav_msgs/msg/Odometry", True), ("/tf", TRANSFORMS, True), ("/tf_static", TRANSFORMS, False)],
+    [
+        ("/odom", "nav_msgs/msg/Odometry", True),
+        ("/tf", TRANSFORMS, True),
+        ("/tf_static", TRANSFORMS, False),
+    ],
 )
 def test_a_bag_of_a_robot_that_may_have_moved(tmp_path, topic, kind, warns, recwarn):
-    """Odometry or moving transforms give a warning that the poses are none and how to set them; a fixed mount none."""
-    assert not read_log(write_bag(tmp_path / "folder", "2", {"/scan": scans_of}, (topic, kind))).poses.any()
+    """Odometry or moving transforms give a warning that the poses are none and how to set them.
+
+    A fixed mount none.
+    """
+    path = write_bag(tmp_path / "folder", "2", {"/scan": scans_of}, (topic, kind))
+    assert not read_log(path).poses.any()
     said = [str(warning.message) for warning in recwarn]
     assert len(said) == warns
-    assert all(f"{topic} of the bag is not read and every pose is (0, 0, 0)" in s and "poses=poses" in s for s in said)
+    text = f"{topic} of the bag is not read and every pose is (0, 0, 0)"
+    assert all(text in each and "poses=poses" in each for each in said)
 
 
 def test_one_odd_scan_is_left_out(tmp_path):
-    """A scan with another beam count is left out of a long log with a warning, and refused in a short one."""
+    """A scan with another beam count is left out of a long log, with a warning.
+
+    A short log is refused.
+    """
 
     def odd(count):
-        return lambda store: [*scans_of(store, [1.0], count=1), *list(scans_of(store, count=count))[1:]]
+        def messages(store):
+            return [*scans_of(store, [1.0], count=1), *list(scans_of(store, count=count))[1:]]
 
-    with pytest.warns(UserWarning, match="left out 1 broken of 40 scans, the first on line 1: 1 beams from"):
+        return messages
+
+    text = "left out 1 broken of 40 scans, the first on line 1: 1 beams from"
+    with pytest.warns(UserWarning, match=text):
         assert len(read_log(write_bag(tmp_path / "a.bag", "1", {"/scan": odd(40)}))) == 39
     with pytest.raises(FormatError, match="beams"):
         read_log(write_bag(tmp_path / "b.bag", "1", {"/scan": odd(5)}))
@@ -111,8 +137,9 @@ def test_one_odd_scan_is_left_out(tmp_path):
 
 @pytest.mark.parametrize("version", ["1", "mcap"])
 def test_damaged_bags(tmp_path, version):
-    """Empty, cut off, overwritten and foreign files give a FormatError, never a failure in the depth of the reader."""
-    path = write_bag(tmp_path / ("a.bag" if version == "1" else "folder"), version, {"/scan": scans_of})
+    """Empty, cut off, overwritten and foreign files give a FormatError; never another error."""
+    name = "a.bag" if version == "1" else "folder"
+    path = write_bag(tmp_path / name, version, {"/scan": scans_of})
     path = path if version == "1" else next(path.glob("*.mcap"))
     content, rng = path.read_bytes(), np.random.default_rng(0)
     damaged = [b"", b"#ROSBAG V2.0\n", b"\0" * 100, content[: len(content) // 2]]
@@ -138,7 +165,7 @@ def test_empty_bag_and_folder(tmp_path):
         read_log(tmp_path)
 
 
-@pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA is not set")
+@pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="no recordings")
 def test_bag_with_message_types_of_its_own(tmp_path):
     """A bag that also holds messages of unknown types gives its 7,170 scans over 720 s."""
     archive = Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / "people/person_following_outdoor_1.bag.zip"

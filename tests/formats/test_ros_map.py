@@ -28,7 +28,10 @@ def load_ros(folder, text=MAP_SERVER, picture=PGM):
 
 
 def test_map_server_map(tmp_path):
-    """A map as map_server saves it: first row of the picture on top, dark is occupied, grey between is unknown."""
+    """A map as map_server saves it.
+
+    First row of the picture on top, dark is occupied, grey between is unknown.
+    """
     grid = load_ros(tmp_path)
     assert grid.origin == (-10.0, 5.5) and grid.resolution == 0.05
     assert grid.occupied.tolist() == [[False, False, True], [True, False, False]]
@@ -62,13 +65,20 @@ def test_map_server_options(tmp_path, old, new, occupied):
     ],
 )
 def test_lists_of_yaml(tmp_path, origin):
-    """An origin is read however YAML lays out its three numbers, and a heading of a rounding error is none."""
+    """An origin is read however YAML lays out its three numbers.
+
+    A heading of a rounding error is none.
+    """
     text = MAP_SERVER.replace("origin: [-10.0, 5.5, 0.000000]  # x, y, yaw", origin)
     assert load_ros(tmp_path, text).origin == (-10.0, 5.5)
 
 
 @pytest.mark.parametrize(
-    "name", ["my room #2", " room", "bob's", 'a "b" #c', "- a", "b: c", "caf\u00e9", "\\", "\n", "%x"]
+    "name",
+    [
+        *("my room #2", " room", "bob's", 'a "b" #c', "- a"),
+        *("b: c", "caf\u00e9", "\\", "\n", "%x"),
+    ],
 )
 def test_every_name_reads_back(tmp_path, name):
     """Whatever the map is called, its YAML names the picture beside it."""
@@ -78,10 +88,16 @@ def test_every_name_reads_back(tmp_path, name):
 
 @pytest.mark.parametrize(
     "image",
-    ["'floor #1.pgm'", '"floor #1.pgm"  # the first', '"floor \\u00231.pgm"', '"floor \\x231.pgm"', "floor\n  #1.pgm"],
+    [
+        *("'floor #1.pgm'", '"floor #1.pgm"  # the first'),
+        *('"floor \\u00231.pgm"', '"floor \\x231.pgm"', "floor\n  #1.pgm"),
+    ],
 )
 def test_names_in_yaml(tmp_path, image):
-    """A name in either kind of quotes is what stands between them; only outside does # begin a comment."""
+    """A name in either kind of quotes is what stands between them.
+
+    Only outside does # begin a comment.
+    """
     (tmp_path / "floor #1.pgm").write_bytes(PGM)
     text = MAP_SERVER.replace('"floor.pgm"', image)
     if image.startswith("floor"):
@@ -93,9 +109,13 @@ def test_names_in_yaml(tmp_path, image):
 
 @pytest.mark.parametrize("mode", ["L", "1", "P", "LA", "RGB", "RGBA", "I;16"])
 def test_png_maps(tmp_path, mode):
-    """A PNG of any colour mode is the same map as the PGM; see-through pixels and broken files are refused."""
+    """A PNG of any colour mode is the same map as the PGM.
+
+    See-through pixels and broken files are refused.
+    """
     grey = np.array([[0, 255, 255], [255, 0, 0]], np.uint8)
-    picture = Image.fromarray(grey.astype(np.uint16) * 257) if mode == "I;16" else Image.fromarray(grey).convert(mode)
+    sixteen_bits = Image.fromarray(grey.astype(np.uint16) * 257)
+    picture = sixteen_bits if mode == "I;16" else Image.fromarray(grey).convert(mode)
     packed = io.BytesIO()
     picture.save(packed, "png")
     grid = load_ros(tmp_path, picture=packed.getvalue())
@@ -141,19 +161,19 @@ def test_plain_pgm(tmp_path):
         ("image: floor.pgm\nresolution: 0.05\n", PGM, "origin must be .x, y, 0. .*, got None"),
         (MAP_SERVER.replace("0.050000", "fine"), PGM, "resolution must be a number, got 'fine'"),
         (MAP_SERVER.replace("0.050000", "yes"), PGM, "resolution must be a number, got True"),
-        (MAP_SERVER.replace("0.050000", "-1"), PGM, "resolution must be positive and finite, got -1"),
+        (MAP_SERVER.replace("0.050000", "-1"), PGM, "resolution must be positive .*, got -1"),
         (MAP_SERVER.replace("0.000000", "0.3"), PGM, r"a turned map is not supported"),
         (MAP_SERVER.replace("5.5, ", ""), PGM, r"origin must be \[x, y, 0\]"),
         (MAP_SERVER.replace("5.5", "nan"), PGM, "origin must be"),
         (MAP_SERVER.replace("0.000000", "nan"), PGM, "a turned map is not supported"),
-        (MAP_SERVER.replace("negate: 0", "negate: banana"), PGM, "negate must be one of 0, 1, got 'banana'"),
+        (MAP_SERVER.replace("negate: 0", "negate: banana"), PGM, "negate must be .*, got 'banana'"),
         (MAP_SERVER.replace("negate: 0", "negate:"), PGM, "negate must be one of 0, 1, got None"),
         (MAP_SERVER.replace("0.65", "nan"), PGM, "free_thresh 0.196 and occupied_thresh nan"),
         (MAP_SERVER.replace("0.65", "5"), PGM, "<= 1, got free_thresh 0.196 and occupied_thresh 5"),
         (MAP_SERVER.replace("0.65", "0.1"), PGM, "free_thresh 0.196 and occupied_thresh 0.1"),
         (MAP_SERVER.replace("0.196", "-1"), PGM, "got free_thresh -1"),
         (MAP_SERVER.replace('"floor.pgm"', '"\\x"'), PGM, "not YAML: .*line 2"),
-        (MAP_SERVER + "mode: best\n", PGM, "mode must be one of 'trinary', 'scale', 'raw', got 'best'"),
+        (MAP_SERVER + "mode: best\n", PGM, "mode must be one of 'trinary', .*, got 'best'"),
         (MAP_SERVER + "nonsense\n", PGM, "not YAML: .*line 8"),
         ("[1, 2]", PGM, "expected 'key: value' in each line, got .\\[1, 2\\]"),
         (MAP_SERVER, PGM[:-1], "not a readable picture .*truncated"),
@@ -174,7 +194,7 @@ def test_broken_ros_maps(tmp_path, text, picture, message):
 
 
 def test_every_probability_keeps_its_side_in_a_ros_map(tmp_path):
-    """However near to a half, a free cell comes back free, an occupied one occupied, an unknown one unknown."""
+    """A cell comes back free, occupied or unknown as it was; however near to a half."""
     near = np.append(np.linspace(0, 1, 2001), [np.nextafter(0.5, 0), 0.5, 0.498, 0.502, np.nan])
     grid = OccupancyGrid(near[None], (0.0, 0.0), 0.05)
     grid.save(tmp_path / "a.yaml")
@@ -184,7 +204,11 @@ def test_every_probability_keeps_its_side_in_a_ros_map(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "picture", [b"P2 2 1 5\n0 7\n", b"P2 2 1 5\n-1 0\n", b"P5 2 1 300\n" + bytes(2), b"P5 2 1 256\n\0\1"]
+    "picture",
+    [
+        *(b"P2 2 1 5\n0 7\n", b"P2 2 1 5\n-1 0\n"),
+        *(b"P5 2 1 300\n" + bytes(2), b"P5 2 1 256\n\0\1"),
+    ],
 )
 def test_one_bad_pixel_is_enough(tmp_path, picture):
     """A single pixel out of range among good ones, or more than 255 steps of grey, is refused."""

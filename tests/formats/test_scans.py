@@ -28,8 +28,12 @@ def test_longest_rise_is_as_long_as_brute_force(values):
 
 
 def test_one_broken_scan_in_a_long_log_is_forgiven():
-    """One of 20, or three of 300, are left out with a single warning that counts them and names the first line."""
-    with pytest.warns(UserWarning, match="left out 1 broken of 20 scans, the first on line 3: odd") as record:
+    """One of 20, or three of 300, are left out.
+
+    A single warning counts them and names the first line.
+    """
+    text = "left out 1 broken of 20 scans, the first on line 3: odd"
+    with pytest.warns(UserWarning, match=text) as record:
         forgive("a.log", {3: "odd"}, 20)
     assert len(record) == 1
     with pytest.warns(UserWarning, match="left out 3 broken of 300"):
@@ -38,7 +42,10 @@ def test_one_broken_scan_in_a_long_log_is_forgiven():
 
 @pytest.mark.parametrize(("bad", "total"), [(1, 19), (2, 100), (4, 300), (50, 100)])
 def test_many_broken_scans_are_not_forgiven(bad, total):
-    """More than one scan in a hundred, or any in a short log, is an error with the first broken line."""
+    """More than one scan in a hundred, or any in a short log, is an error.
+
+    It names the first line.
+    """
     with pytest.raises(FormatError, match=rf"a.log, line 3: odd \({bad} of {total}"):
         forgive("a.log", {3 + i: "odd" for i in range(bad)}, total)
 
@@ -66,14 +73,18 @@ def test_a_scan_far_from_both_neighbours_is_left_out(stray, time):
     """Forwards or backwards, within the log or at its end: one such scan takes only itself away."""
     t = np.arange(100) * 0.1
     t[stray] = time
-    with pytest.warns(UserWarning, match="left out 1 of 100 scans, which the clock puts out of order") as record:
+    text = "left out 1 of 100 scans, which the clock puts out of order"
+    with pytest.warns(UserWarning, match=text) as record:
         keep, kept = _usable_clock("a.log", t)
     assert keep.tolist() == [i for i in range(100) if i != stray] and np.array_equal(kept, t[keep])
     assert len(record) == 1
 
 
 def test_a_lasting_jump_is_told():
-    """A clock that is set forwards for good leaves every scan in order, with a warning of the jump."""
+    """A clock that is set forwards for good leaves every scan in order.
+
+    A warning tells the jump.
+    """
     t = np.arange(100) * 0.1 + 1e6 * (np.arange(100) >= 50)
     with pytest.warns(UserWarning, match="the clock jumps by 1e.06 s") as record:
         keep, kept = _usable_clock("a.log", t)
@@ -82,7 +93,10 @@ def test_a_lasting_jump_is_told():
 
 @pytest.mark.parametrize("t", [np.zeros(50), -np.arange(50.0), np.tile(np.arange(25.0), 2)])
 def test_a_useless_clock_is_replaced_and_said_so(t):
-    """All zero, running backwards or reset in the middle: every scan is kept, at the nominal rate, with a warning."""
+    """All zero, running backwards or reset in the middle.
+
+    Every scan is kept, at the nominal rate, with a warning.
+    """
     with pytest.warns(UserWarning, match="timed at 10 Hz; speeds mean nothing"):
         keep, kept = _usable_clock("a.log", t)
     assert len(keep) == 50
@@ -91,7 +105,10 @@ def test_a_useless_clock_is_replaced_and_said_so(t):
 
 @pytest.mark.parametrize(("scans", "kept"), [(20, 19), (19, 19)])
 def test_one_scan_in_twenty_may_be_out_of_order(scans, kept):
-    """Exactly one in twenty is left out and the times stay; one in nineteen makes the clock worthless."""
+    """Exactly one in twenty is left out and the times stay.
+
+    One in nineteen makes the clock worthless.
+    """
     t = 5 + np.arange(scans) * 0.5
     t[3] = 1e9
     with pytest.warns(UserWarning):
@@ -108,7 +125,8 @@ def scans_of(counts):
 
 def test_scans_of_another_geometry_are_left_out():
     """Those of most stay, with their times; what is broken otherwise counts with them."""
-    with pytest.warns(UserWarning, match="left out 1 broken of 30 scans, the first on line 5: 4 beams .*have 3 beams"):
+    text = "left out 1 broken of 30 scans, the first on line 5: 4 beams .*have 3 beams"
+    with pytest.warns(UserWarning, match=text):
         scans, t = usable_scans("a.log", scans_of([3, 3, 4, *[3] * 27]), {})
     assert {scan.beams.count for scan in scans} == {3}
     assert t.tolist() == [i / 10 for i in range(30) if i != 2]
