@@ -112,7 +112,7 @@ class Motion:
         velocity = dt**4 / 8, dt**3 / 3, dt**2 / 2
         acceleration = dt**3 / 6, dt**2 / 2, dt
         Q = self.noise * np.array([position, velocity, acceleration])
-        return F[:n, :n], Q[-n:, -n:]
+        return F[:n, :n].copy(), Q[-n:, -n:].copy()  # views would be multiplied more slowly
 
     def birth(self, positions):
         """States of objects at first sight, their velocity unknown (a reconstruction).
