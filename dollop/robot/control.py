@@ -235,11 +235,13 @@ class Guidance:
         It is the subgoal where the response comes that near to it before.
         """
         here, goal, (a, b, c, d) = (x, y), self.goals[k], self._steps[k]
-        while dist(state, here) < STEP <= dist(state, goal):
+        while dist(state, here) < STEP:
+            if dist(state, goal) < STEP:
+                return goal
             offset_x, offset_y = state[0] - goal[0], state[1] - goal[1]
             state_x = state[0] + a * offset_x + b * offset_y
             state = state_x, state[1] + c * offset_x + d * offset_y
-        return state if dist(state, here) >= STEP else goal
+        return state
 
     def way(self, k, x, y):
         """The responses of a segment and of all after it, rolled out one after the other.
