@@ -1,19 +1,23 @@
-"""Sec. IV-B: subgoals associated with objects, so that they move as the objects move.
+"""Subgoals associated with objects, so that they move as the objects move (Sec. IV-B).
 
 From one demonstration, the paper's way: a subgoal s keeps its differences to the m nearest corners,
 
-    s' = sum_l w_l (omega'_g(l) + s - omega_l),      w_l ~ 1 / (||s - omega_l||^2 + eps),   sum_l w_l = 1.
+    s' = sum_l w_l (omega'_g(l) + s - omega_l),    w_l ~ 1 / (||s - omega_l||^2 + eps),
 
-The paper says only that "closer environment objects have higher weights"; this form of the weights is a reconstruction.
+and the weights sum to 1.
 
-Several demonstrations among objects that stood elsewhere each time are a second source of evidence (beyond the paper):
-beside the object that matters, they vary little. Here each object is a frame, a position with a direction, and
+The paper says only that "closer environment objects have higher weights"; this form of the weights
+is a reconstruction.
+
+Several demonstrations among objects that stood elsewhere each time are a second source of evidence
+(beyond the paper): beside the object that matters, they vary little. Here each object is a frame, a
+position with a direction, and
 
     w_l ~ 1 / (d_l^2 + eps)  *  1 / v_l
 
-with d_l the distance of the subgoal from frame l and v_l its variance seen from frame l, over the demonstrations. Of
-one demonstration there is no variance, and between demonstrations in one and the same environment it is equal beside
-all objects: in both cases closeness alone is left.
+with d_l the distance of the subgoal from frame l and v_l its variance seen from frame l, over the
+demonstrations. Of one demonstration there is no variance, and between demonstrations in one and the
+same environment it is equal beside all objects: in both cases closeness alone is left.
 """
 
 from dataclasses import dataclass
@@ -32,7 +36,7 @@ _EPSILON = 0.05**2  # m²: corners are not known better than to a cell of the fo
 
 @dataclass(frozen=True, eq=False)
 class Association:
-    """K subgoals, each tied to m corners of an environment.
+    """K subgoals, each tied to m corners of an environment (Sec. IV-B).
 
     Attributes
     ----------
@@ -41,7 +45,8 @@ class Association:
     corners : (K, m) int array
         Which corners each subgoal is tied to; from `associate` the nearest first.
     weights : (K, m) array
-        w_l, none negative. One row sums to 1, or to less after `carried` has cut ties to objects that are gone.
+        w_l, none negative. One row sums to 1, or to less after `carried` has cut ties to objects
+        that are gone.
     differences : (K, m, 2) array
         s - omega_l in m.
     """
@@ -63,8 +68,9 @@ class Association:
         environment : Environment
             The objects as they stand now.
         matching : Matching, optional
-            From the associated environment to this one; found by `match` when not given. Corners that it leaves out
-            drop out, and the weights of a subgoal's other corners take their part.
+            From the associated environment to this one; found by `match` when not given. Corners
+            that it leaves out drop out, and the weights of a subgoal's other corners take their
+            part.
         turned : bool
             Beyond the paper: turn the differences with the layout, see `layout_turn`.
 
@@ -76,8 +82,8 @@ class Association:
         Raises
         ------
         ValueError
-            Where the environments cannot be matched with confidence, where a given matching belongs to others, or
-            where it leaves out all corners of a subgoal.
+            Where the environments cannot be matched with confidence, where a given matching belongs
+            to others, or where it leaves out all corners of a subgoal.
         """
         indices, corners, weights = self._ties(environment, matching)
         totals = weights.sum(axis=1, keepdims=True)
@@ -94,10 +100,27 @@ class Association:
         return np.einsum("km,kmd->kd", weights / totals, moved)
 
     def carried(self, environment, matching=None):
-        """The same ties with the objects where they stand now: parameters as for `relocate`.
+        """The same ties with the objects where they stand now (Sec. IV-B).
 
-        Relocating from it goes on from the demonstrated differences, so that moving objects there and back moves
-        nothing. Ties to objects that are gone are cut.
+        Relocating from it goes on from the demonstrated differences, so that moving objects there
+        and back moves nothing. Ties to objects that are gone are cut.
+
+        Parameters
+        ----------
+        environment : Environment
+            The objects as they stand now.
+        matching : Matching, optional
+            As for `relocate`.
+
+        Returns
+        -------
+        Association
+            With corners of that environment.
+
+        Raises
+        ------
+        ValueError
+            As `relocate`, but that a subgoal may lose all its ties.
         """
         _, corners, weights = self._ties(environment, matching)
         return Association(environment, corners, weights, self.differences)
@@ -109,8 +132,9 @@ class Association:
         n, m, indices = len(self.environment.corners), len(environment.corners), matching.indices
         highest = indices.max(initial=-1)
         if len(indices) != n or highest >= m:
-            rule = f"from the {n} associated corners to the {m} present ones"
-            raise ValueError(f"the matching must go {rule}, got {len(indices)} indices up to {highest}")
+            found = f"{len(indices)} indices up to {highest}"
+            rule = f"must go from the {n} associated corners to the {m} present ones"
+            raise ValueError(f"the matching {rule}, got {found}")
         partners = indices[self.corners]
         return indices, np.maximum(partners, 0), self.weights * (partners >= 0)
 
@@ -162,7 +186,7 @@ def associate(subgoals, environment, m=4):
 
 
 def layout_turn(corners_i, corners_j):
-    """By how much a layout has turned: the least-squares angle between matched points.
+    """By how much a layout has turned: the least-squares angle (beyond the paper).
 
     Parameters
     ----------
@@ -186,7 +210,7 @@ def layout_turn(corners_i, corners_j):
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Objects that have a direction as well as a position.
+    """Objects that have a direction as well as a position (beyond the paper).
 
     Parameters
     ----------
@@ -219,7 +243,7 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class FrameAssociation:
-    """K subgoals tied to M frames.
+    """K subgoals tied to M frames (beyond the paper).
 
     Attributes
     ----------
@@ -237,7 +261,23 @@ class FrameAssociation:
         return f"FrameAssociation of {subgoals} subgoals with {frames} frames"
 
     def relocate(self, frames):
-        """Where the subgoals (K, 2) are, in m, when the frames stand elsewhere: the same frames in the same order."""
+        """Where the subgoals are when the frames stand elsewhere (beyond the paper).
+
+        Parameters
+        ----------
+        frames : Frames
+            The same M objects in the same order, as they stand now.
+
+        Returns
+        -------
+        (K, 2) array
+            Subgoals in m.
+
+        Raises
+        ------
+        ValueError
+            Another number of frames.
+        """
         if len(frames) != len(self.local):
             raise ValueError(f"the number of frames must stay {len(self.local)}, got {len(frames)}")
         moved = self.local @ rotation(frames.directions).swapaxes(1, 2) + frames.positions[:, None]
@@ -245,7 +285,9 @@ class FrameAssociation:
 
 
 def associate_with_frames(subgoals, frames):
-    """Tie subgoals to frames, by closeness and, from several demonstrations, by how little they vary.
+    """Tie subgoals to frames, by closeness and by how little they vary (beyond the paper).
+
+    How little they vary is told from several demonstrations only.
 
     Parameters
     ----------
@@ -265,7 +307,8 @@ def associate_with_frames(subgoals, frames):
 
     Examples
     --------
-    A goal between two objects, as near to one as to the other, that moved with the second: that is the one to follow.
+    A goal between two objects, as near to one as to the other, that moved with the second: that is
+    the one to follow.
 
     >>> still, moved = Frames([[0, 0], [2, 0]], [0, 0]), Frames([[0, 0], [2, 2]], [0, 0])
     >>> associate_with_frames([[[1, 0]]], [still]).weights.ravel().round(2).tolist()
@@ -285,9 +328,13 @@ def associate_with_frames(subgoals, frames):
 
 
 def _variances(local):
-    """(M, K) variance of D demonstrations (D, M, K, 2), up to a factor; of one alone it is the same for all frames."""
+    """Variance (M, K) of D demonstrations (D, M, K, 2), up to a factor.
+
+    Of one alone it is the same for all frames.
+    """
     squares = ((local - local.mean(axis=0)) ** 2).sum(axis=(0, 3))
-    # A handful of demonstrations may agree by chance: one virtual one, of mean variance, keeps the weights finite.
-    # Less variance than corners are known to tells nothing: it may be mere rounding.
+    # A handful of demonstrations may agree by chance: one virtual one, of mean variance, keeps the
+    # weights finite. Less variance than corners are known to tells nothing: it may be mere
+    # rounding.
     usual = squares.mean() / max(len(local) - 1, 1)
     return squares + max(usual, _EPSILON)

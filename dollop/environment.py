@@ -1,11 +1,14 @@
-"""Sec. IV: the environment configuration, and the springs between its corners.
+"""The environment configuration, and the springs between its corners (Sec. IV).
 
-The objects of the lab are axis-parallel boxes; the paper's environment configuration is the set of their corners
-omega_1 ... omega_4N. Between any two corners of one environment there is a spring, stronger where they are closer,
+The objects of the lab are axis-parallel boxes; the paper's environment configuration is the set of
+their corners omega_1 ... omega_4N. Between any two corners of one environment there is a spring,
+stronger where they are closer,
 
-    k_mn = ||omega_m - omega_n||^-2,      f_m = sum_{n != m} k_mn (omega_n - omega_m) / ||omega_n - omega_m||,
+    k_mn = ||omega_m - omega_n||^-2
+    f_m = sum_{n != m} k_mn (omega_n - omega_m) / ||omega_n - omega_m||
 
-and matching corner m of environment i with corner n of environment j costs ceil(alpha ||f_m^i - f_n^j||).
+and matching corner m of environment i with corner n of environment j costs
+ceil(alpha ||f_m^i - f_n^j||).
 """
 
 from dataclasses import dataclass
@@ -18,9 +21,10 @@ from dollop.checks import checked_array
 
 __all__ = ["Environment", "corner_indices", "integer_costs", "spring_constants", "spring_forces"]
 
-# A corner's place in its box: 0 lower left, then counter-clockwise. The columns are those of a box (x, y).
+# A corner's place in its box: 0 lower left, then counter-clockwise. The columns are those of a box.
 _CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
-# The ceiling would make 1 of a rounding error of 1e-13: changes of force below this many units count as none.
+# The ceiling would make 1 of a rounding error of 1e-13: changes of force below this many units
+# count as none.
 _ROUNDING = 1e-6
 
 
@@ -31,8 +35,8 @@ class Environment:
     Parameters
     ----------
     boxes : (N, 4) array
-        xmin, ymin, xmax, ymax of each object in m. N may be 0: a lab with nothing in it is a fact to record, although
-        nothing can be matched with it or associated with it.
+        xmin, ymin, xmax, ymax of each object in m. N may be 0: a lab with nothing in it is a fact
+        to record, although nothing can be matched with it or associated with it.
 
     Raises
     ------
@@ -63,7 +67,7 @@ class Environment:
 
     @cached_property
     def corners(self):
-        """(4N, 2) array, m: corner k of object n in row 4n + k, counter-clockwise from the lower left."""
+        """(4N, 2) array, m: corner k of object n in row 4n + k, as they run round the box."""
         return self.boxes[:, _CORNER_COLUMNS].reshape(-1, 2)
 
     @cached_property
@@ -77,16 +81,16 @@ class Environment:
         return self.corners - np.repeat(self.centres, 4, axis=0)
 
     def __repr__(self):
-        places = ", ".join(f"({x:.2f}, {y:.2f})" for x, y in self.centres[:6])
+        where = ", ".join(f"({x:.2f}, {y:.2f})" for x, y in self.centres[:6])
         more = f", ... {len(self) - 6} more" if len(self) > 6 else ""
-        return f"Environment of {len(self)} objects" + (f" round {places}{more}" if len(self) else "")
+        return f"Environment of {len(self)} objects" + (f" round {where}{more}" if len(self) else "")
 
 
 def corner_indices(partners, turn=0.0):
-    """Which corner each corner goes to, where it is known which object each object goes to.
+    """Which corner each corner goes to, where objects are matched (reconstruction).
 
-    Boxes stay parallel to the axes: in a layout that was turned by a right angle the lower left corner becomes the
-    lower right.
+    Boxes stay parallel to the axes: in a layout that was turned by a right angle the lower left
+    corner becomes the lower right.
 
     Parameters
     ----------
@@ -188,6 +192,14 @@ def integer_costs(corners_i, corners_j, alpha=1e3):
     ------
     ValueError
         Where two corners of one environment coincide.
+
+    Examples
+    --------
+    Only where corners stand beside each other counts, not where all of them stand.
+
+    >>> corners = np.array([[0, 0], [1, 0], [3, 1]])
+    >>> np.diag(integer_costs(corners, corners + 7.3)).tolist()
+    [0, 0, 0]
     """
     changes = scipy.spatial.distance.cdist(spring_forces(corners_i), spring_forces(corners_j))
     return np.ceil(alpha * changes - _ROUNDING).astype(np.int64)

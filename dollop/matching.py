@@ -1,21 +1,25 @@
-"""Sec. IV-A: which corner of one environment is which corner of another.
+"""Which corner of one environment is which corner of another (Sec. IV-A).
 
-The literal method is the paper's: springs between all 4N corners, a bijection that changes the forces least. Its forces
-are dominated by the springs within each box, so that an error of a few centimetres in a box outweighs where the
-boxes stand. The robust method, the default, matches objects first and corners after. It takes it that every object
-was moved by itself, and that the layout may have been turned and shifted as a whole before. With z_a and w_a the n
-matched positions of the two environments about their means, as complex numbers, and with
-s = sum_a conj(z_a) w_a / sigma^2, a matching costs, in nats (negative log probability, but for a constant),
+The literal method is the paper's: springs between all 4N corners, a bijection that changes the
+forces least. Its forces are dominated by the springs within each box, so that an error of a few
+centimetres in a box outweighs where the boxes stand. The robust method, the default, matches
+objects first and corners after. It takes it that every object was moved by itself, and that the
+layout may have been turned and shifted as a whole before. With z_a and w_a the n matched positions
+of the two environments about their means, as complex numbers, and with
+s = sum_a conj(z_a) w_a / sigma^2, a matching costs, in nats (negative log probability, but for a
+constant),
 
-    sum_a (|z_a|^2 + |w_a|^2) / (2 sigma^2)                      objects moved by themselves, sd sigma per axis
-    - log(exp(Re s) + exp(|s + kappa| - kappa - L_turn))         no turn, or any, which costs L_turn
-    - log(exp(-n |shift|^2 / (2 sigma^2)) + exp(-L_shift))       no shift of the mean, or any, which costs L_shift
-    + c (N + M - 2n)                                             each object left out
+    sum_a (|z_a|^2 + |w_a|^2) / (2 sigma^2)                   objects moved by themselves
+    - log(exp(Re s) + exp(|s + kappa| - kappa - L_turn))      no turn, or any, for L_turn
+    - log(exp(-n |shift|^2 / (2 sigma^2)) + exp(-L_shift))    no shift, or any, for L_shift
+    + c (N + M - 2n)                                          each object left out
 
-The second line is the closed form of the best turn: a turn by theta takes Re(e^{-i theta} s) off the first line and
-costs kappa (1 - cos theta), least at theta = arg(s + kappa). While no object is left out the shift is the same for all
-matchings, so that only relative positions count. Where some are missing, the rest may fit in several places; then
-staying in place counts, by L_shift at most.
+with sigma the standard deviation of the moves per axis, and the shift that of the mean. All this is
+a reconstruction.
+The second line is the closed form of the best turn: a turn by theta takes Re(e^{-i theta} s) off
+the first line and costs kappa (1 - cos theta), least at theta = arg(s + kappa). While no object is
+left out the shift is the same for all matchings, so that only relative positions count. Where some
+are missing, the rest may fit in several places; then staying in place counts, by L_shift at most.
 """
 
 from dataclasses import dataclass
@@ -34,7 +38,8 @@ __all__ = ["Matching", "match", "match_confidently"]
 _KAPPA = 1.0  # of a layout that was turned, small turns are a little likelier
 _TURNED = 4.0  # L_turn, nats
 _SHIFTED = 6.0  # L_shift, nats
-_UNMOVED = np.log1p(np.exp(-_TURNED)) + np.log1p(np.exp(-_SHIFTED))  # what makes it cost 0 if nothing moved
+# What makes a matching cost 0 if nothing moved:
+_UNMOVED = np.log1p(np.exp(-_TURNED)) + np.log1p(np.exp(-_SHIFTED))
 _ODDS = 20.0  # a matching is confident where it is this much more probable than the second best
 
 _ENUMERATED = 2000  # up to so many partial matchings all are tried
@@ -54,13 +59,16 @@ class Matching:
     cost : float
         Literal: the total change in force in 1/alpha 1/m². Robust: nats, see the module.
     margin : float
-        What the best of all other matchings costs more; 0 is a tie. Literal: of all other bijections of the corners.
-        Robust: of all matchings with another partner for one object at least.
+        What the best of all other matchings costs more; 0 is a tie. Literal: of all other
+        bijections of the corners. Robust: of all matchings with another partner for one object at
+        least.
     confident : bool
-        False where the scene is ambiguous: ask, do not guess. Literal: the margin exceeds what rounding up can
-        do, one unit per corner. Robust: the matching is at least 20 times as probable as the second best.
+        False where the scene is ambiguous: ask, do not guess. Literal: the margin exceeds what
+        rounding up can do, one unit per corner. Robust: the matching is at least 20 times as
+        probable as the second best.
     turn : float
-        By how much the layout has turned from i to j, in rad; 0 where that need not be, and with the literal method.
+        By how much the layout has turned from i to j, in rad; 0 where that need not be, and with
+        the literal method.
     """
 
     indices: np.ndarray
@@ -76,11 +84,12 @@ class Matching:
 
     @classmethod
     def identity(cls, n):
-        """The matching of n objects with themselves, beyond doubt.
+        """The matching of n objects with themselves, beyond doubt (Sec. IV-A).
 
         Parameters
         ----------
         n : int
+            From 0 on.
 
         Returns
         -------
@@ -90,7 +99,7 @@ class Matching:
 
     @property
     def partners(self):
-        """(N,) int array: object a of i goes to object partners[a] of j; -1 where it is left out."""
+        """(N,) int array: object a of i goes to object partners[a] of j, -1 where left out."""
         return self.indices[::4] // 4
 
 
@@ -102,14 +111,15 @@ def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4
     environment_i, environment_j : Environment
         At least two objects each.
     method : {"robust", "literal"}
-        "robust" compares the layouts of the objects and takes the corners from that; objects may be missing,
-        added or split. "literal" is the paper's: a bijection of the corners with the least change in spring forces.
+        "robust" compares the layouts of the objects and takes the corners from that; objects may be
+        missing, added or split. "literal" is the paper's: a bijection of the corners with the least
+        change in spring forces.
     left_out : float
-        Robust only. Leaving out an object of each environment costs as much as if one had been moved by this many
-        metres, beside the others.
+        Robust only. Leaving out an object of each environment costs as much as if one had been
+        moved by this many metres, beside the others.
     moved : float
-        Robust only. How far objects are moved by themselves: sigma, standard deviation per axis in m. Where they move
-        farther than this, matchings are called confident too easily.
+        Robust only. How far objects are moved by themselves: sigma, standard deviation per axis in
+        m. Where they move farther than this, matchings are called confident too easily.
 
     Returns
     -------
@@ -146,15 +156,39 @@ def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4
 
 
 def match_confidently(environment_i, environment_j, names):
-    """The robust matching of two environments, if it is sure.
+    """The robust matching of two environments, if it is sure (reconstruction).
 
     Of one object in each there is only one; and where all boxes are the same, none has moved.
+
+    Parameters
+    ----------
+    environment_i, environment_j : Environment
+        At least two objects each, or one each.
+    names : (str, str)
+        What to call the two in the error.
+
+    Returns
+    -------
+    Matching
+        A confident one.
 
     Raises
     ------
     ValueError
-        As `match`, and if a second matching is nearly as good: then ask the user, do not guess. `names` say what the
-        two are.
+        As `match`, and if a second matching is nearly as good: then ask the user, do not guess.
+
+    Examples
+    --------
+    Two objects that turned by a right angle could be either way round.
+
+    >>> from dollop.environment import Environment
+    >>> before = Environment([[0, 0, 1, 1], [3, 0, 4, 1]])
+    >>> match_confidently(before, before, ("before", "after")).partners.tolist()
+    [0, 1]
+    >>> after = Environment([[0, 0, 1, 1], [0, 3, 1, 4]])
+    >>> match_confidently(before, after, ("before", "after"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ValueError: before and after cannot be matched with confidence: ... only 0.00 more...
     """
     unmoved = np.array_equal(environment_i.boxes, environment_j.boxes)
     if unmoved or len(environment_i) == len(environment_j) == 1:
@@ -179,7 +213,7 @@ def _match_literally(environment_i, environment_j):
 
 def _match_robustly(environment_i, environment_j, left_out, moved):
     x, y = (each.centres @ (1, 1j) / moved for each in (environment_i, environment_j))  # sigma is 1
-    # One object of each left out costs what a move of left_out costs: 2 c = left_out^2 / (2 sigma^2).
+    # One object of each left out costs as a move by left_out: 2 c = left_out^2 / (2 sigma^2).
     price = (left_out / moved) ** 2 / 4
     ways = sum(comb(len(x), k) * perm(len(y), k) for k in range(len(x) + 1))
     partners, cost, margin, turn = (_enumerate if ways <= _ENUMERATED else _search)(x, y, price)
@@ -227,9 +261,10 @@ def _all_partial(n, m):
 
 
 def _search(x, y, price):
-    """A good partial matching of many objects: the alignments that fit best, each refined by assignments.
+    """A good partial matching of many objects: of the alignments that fit best, each refined.
 
-    The margin is the exact one with turn and shift held at their best, or that to another alignment where it is less.
+    The margin is the exact one with turn and shift held at their best, or that to another alignment
+    where it is less.
     """
     found = {}
     for alignment in _alignments(x, y, price):
@@ -241,11 +276,11 @@ def _search(x, y, price):
 
 
 def _alignments(x, y, price):
-    """Turns (multiples of 45 degrees) and shifts to start from: those that bring most objects near to others."""
+    """Turns (by 45 degrees), pivots and shifts to start from: those that fit most objects."""
     central = np.argsort(np.abs(x - x.mean()), kind="stable")
     anchors, probes = x[central[: max(1, 100 // len(y))]], x[central[:_PROBES]]
     turns = np.repeat(np.arange(-3, 5) * pi / 4, len(anchors) * len(y) + 1)
-    # Under a turn either the means coincide, or one of the central objects falls on one of the others.
+    # Under a turn either the means coincide, or a central object falls on one of the others.
     shifts = np.tile(np.r_[y.mean() - x.mean(), np.subtract.outer(y, anchors).ravel()], 8)
     pivots = np.tile(np.r_[x.mean(), np.tile(anchors, len(y))], 8)
     images = np.exp(1j * turns)[:, None] * (probes - pivots[:, None]) + (pivots + shifts)[:, None]
@@ -258,7 +293,10 @@ def _alignments(x, y, price):
 
 
 def _refine(x, y, price, *alignment):
-    """Assignment and alignment by turns until neither changes; each step lowers the cost at the given shift."""
+    """Assignment and alignment by turns until neither changes.
+
+    Each step lowers the cost at the given shift.
+    """
     previous = None
     for _ in range(_REFINEMENTS):
         partners = _assign(_moves(x, y, *alignment), price)
@@ -270,7 +308,7 @@ def _refine(x, y, price, *alignment):
 
 
 def _assign(moves, price):
-    # A pair that costs more than leaving out both may as well be assigned at that price, and is dropped after.
+    # A pair that costs more than leaving out both is assigned at that price, and dropped after.
     rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(moves, 2 * price))
     near = moves[rows, columns] < 2 * price
     partners = np.full(len(moves), -1)
@@ -295,9 +333,9 @@ def _moves(x, y, turn, pivot, shift):
 def second_best(costs, partners, left_out=np.inf):
     """What the best of all other assignments costs more.
 
-    Two assignments differ by alternating cycles and paths; if the first is optimal, the best other one differs by a
-    single of them. So it is the cheapest cycle of a graph whose edge a -> b has row a take the column of row b, with
-    one more node for what is left out.
+    Two assignments differ by alternating cycles and paths; if the first is optimal, the best other
+    one differs by a single of them. So it is the cheapest cycle of a graph whose edge a -> b has
+    row a take the column of row b, with one more node for what is left out.
 
     Parameters
     ----------
@@ -312,6 +350,11 @@ def second_best(costs, partners, left_out=np.inf):
     -------
     float
         At least 0; 0 is a tie, `inf` where there is no other.
+
+    Examples
+    --------
+    >>> second_best([[0, 2], [1, 0]], np.array([0, 1]))
+    3.0
     """
     costs = np.asarray(costs, dtype=float)
     rows = np.flatnonzero(partners >= 0)
@@ -330,7 +373,7 @@ def second_best(costs, partners, left_out=np.inf):
 
 
 def _cheapest(costs, left_out, axis):
-    """For each row (or column) that gives up its partner: to take one that was left out, or be left out itself."""
+    """What each row (or column) pays without its partner: for one left out, or to be left out."""
     return np.minimum(costs.min(axis=axis, initial=np.inf) - left_out, left_out)
 
 
@@ -346,8 +389,8 @@ def _cheapest_cycle(edges):
 
 
 def _cheapest_cycle_of_many(edges):
-    # The cheapest swap of two bounds the cheapest cycle, so that, once node potentials have made all edges non-negative
-    # (Johnson), most edges are too dear to be part of it.
+    # The cheapest swap of two bounds the cheapest cycle, so that, once node potentials have made
+    # all edges non-negative (Johnson), most edges are too dear to be part of it.
     swap = (edges + edges.T).min()
     if not 0 < swap < np.inf:
         return swap

@@ -1,4 +1,4 @@
-"""Tasks: learned from demonstrations, adapted to where the objects stand now, saved and loaded (Sec. IV-B and V)."""
+"""Tasks: learned from demonstrations, adapted to moved objects, saved (Sec. IV-B and V)."""
 
 import json
 from dataclasses import asdict, dataclass, replace
@@ -25,12 +25,13 @@ FORMAT, VERSION = "dollop task", 1
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """What the user showed, and where the objects stood.
+    """What the user showed, and where the objects stood (Sec. V).
 
     Attributes
     ----------
     trajectory : (N, 2) float array, or list of (N_k, 2) float arrays
-        The walk in m; several walks of the same task in the same environment, such as laps, are one demonstration.
+        The walk in m; several walks of the same task in the same environment, such as laps, are one
+        demonstration.
     environment : Environment
         The static foreground objects.
     sample_period : float
@@ -57,7 +58,19 @@ class Demonstration:
 
     @classmethod
     def of(cls, observation, tolerance=0.02):
-        """The demonstration in an Observation: the user's laps, or the whole walk if it does not repeat itself.
+        """The demonstration that was observed (Sec. II).
+
+        Parameters
+        ----------
+        observation : Observation
+            Of one user.
+        tolerance : float
+            Largest mean error of a segment in m, see `SequencedLDS.fit`.
+
+        Returns
+        -------
+        Demonstration
+            Of the user's laps, or of the whole walk if it does not repeat itself.
 
         Raises
         ------
@@ -78,7 +91,7 @@ class Demonstration:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A control law whose subgoals are tied to objects.
+    """A control law whose subgoals are tied to objects (Sec. IV-B and V).
 
     Attributes
     ----------
@@ -89,7 +102,8 @@ class Task:
     association : Association
         Ties the law's start and its K subgoals, K + 1 places, to corners of the environment.
     model : SubgoalHMM, optional
-        What several demonstrations had in common, in the environment in which they were learned from. It is not saved.
+        What several demonstrations had in common, in the environment in which they were learned
+        from. It is not saved.
     demonstrations : tuple of Demonstration
         What the task was learned from, so that more can be added.
     """
@@ -106,21 +120,66 @@ class Task:
 
     @classmethod
     def of(cls, demonstration):
-        """The task as one demonstration shows it.
+        """The task as one demonstration shows it (Sec. IV-B).
 
-        Every place is tied to all corners, the near ones strongly, so that it has others to hold on to when an object
-        is gone.
+        Every place is tied to all corners, the near ones strongly, so that it has others to hold on
+        to when an object is gone.
+
+        Parameters
+        ----------
+        demonstration : Demonstration
+
+        Returns
+        -------
+        Task
+            In the environment of the demonstration.
+
+        Raises
+        ------
+        ValueError
+            An environment without objects, or a walk that cannot be segmented at its tolerance.
+
+        Examples
+        --------
+        Objects that all move by the same take the task with them.
+
+        >>> boxes = np.array([[0, 0, 0.4, 0.4], [4, 0, 4.4, 0.4]])
+        >>> angle = np.linspace(0, np.pi, 50)
+        >>> walk = np.stack([2 + np.cos(angle), np.sin(angle)], axis=1)
+        >>> task = Task.of(Demonstration(walk, Environment(boxes)))
+        >>> moved = task.adapt(Environment(boxes + [0.5, 2.0, 0.5, 2.0]))
+        >>> bool(np.allclose(moved.law.response(), task.law.response() + [0.5, 2.0]))
+        True
         """
         law, environment = demonstration.law, demonstration.environment
         association = associate(anchors(law), environment, m=len(environment.corners))
         return cls(law, environment, association, demonstrations=(demonstration,))
 
     def add(self, demonstration, spread=0.15):
-        """The task as `learn` has it from all demonstrations so far and one more, in this task's environment."""
+        """The task learned from all demonstrations so far and one more (Sec. V).
+
+        Parameters
+        ----------
+        demonstration : Demonstration
+        spread : float
+            As for `learn`.
+
+        Returns
+        -------
+        Task
+            In this task's environment.
+
+        Raises
+        ------
+        ValueError
+            As `learn`.
+        """
         return learn([*self.demonstrations, demonstration], self.environment, spread)
 
     def adapt(self, environment, matching=None, turned=False):
-        """The task where the objects stand now: its subgoals moved, each LDS adapting by itself (Sec. IV-B).
+        """The task where the objects stand now (Sec. IV-B).
+
+        Its subgoals move, and each LDS adapts by itself.
 
         Parameters
         ----------
@@ -148,7 +207,17 @@ class Task:
         return replace(self, law=law, environment=environment, association=tied)
 
     def save(self, path):
-        """Write the task as JSON, whole or not at all."""
+        """Write the task as JSON, whole or not at all (a format of this library's own).
+
+        Parameters
+        ----------
+        path : str or Path
+
+        Raises
+        ------
+        OSError
+            Where the file cannot be written.
+        """
         with whole_file(path, "w") as stream:
             json.dump(as_dict(self), stream, indent=1, default=np.ndarray.tolist)
             stream.write("\n")
@@ -156,6 +225,15 @@ class Task:
     @classmethod
     def load(cls, path):
         """Read a task that `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+
+        Returns
+        -------
+        Task
+            Without its `model`.
 
         Raises
         ------
@@ -177,7 +255,18 @@ class Task:
 
 
 def anchors(law):
-    """The places of a law that move with objects: its start and its subgoals, (K + 1, 2) in m."""
+    """The places of a law that move with objects: its start and its subgoals (Sec. IV-B).
+
+    Parameters
+    ----------
+    law : SequencedLDS
+        Of K segments.
+
+    Returns
+    -------
+    (K + 1, 2) float array
+        In m.
+    """
     return np.vstack([law.start, law.subgoals])
 
 
@@ -243,8 +332,9 @@ def demonstration_from(content):
 def learn(demonstrations, environment=None, spread=0.15):
     """Learn a task from demonstrations in different environments (Sec. V).
 
-    Every demonstration is segmented and mapped to one environment by matching and association; a CDHMM is estimated
-    from all subgoals by merging; its most-likely path is the task, and segments merged along an edge share one LDS.
+    Every demonstration is segmented and mapped to one environment by matching and association; a
+    CDHMM is estimated from all subgoals by merging; its most-likely path is the task, and segments
+    merged along an edge share one LDS.
 
     Parameters
     ----------
@@ -253,18 +343,20 @@ def learn(demonstrations, environment=None, spread=0.15):
     environment : Environment, optional
         The environment to learn in; that of the first demonstration by default.
     spread : float
-        How far the subgoal of one demonstration is expected to lie from its mean, standard deviation in m.
+        How far the subgoal of one demonstration is expected to lie from its mean, standard
+        deviation in m.
 
     Returns
     -------
     Task
-        In that environment; `.model` is the CDHMM, whose `.outliers()` are demonstrations of something else.
+        In that environment; `.model` is the CDHMM, whose `.outliers()` are demonstrations of
+        something else.
 
     Raises
     ------
     ValueError
-        No demonstration; one whose environment cannot be matched with confidence, named with the margin; or one that
-        cannot be segmented at its tolerance.
+        No demonstration; one whose environment cannot be matched with confidence, named with the
+        margin; or one that cannot be segmented at its tolerance.
     """
     demonstrations = tuple(demonstrations)
     if not demonstrations:
@@ -322,6 +414,11 @@ def shared_law(laws, members, places):
     members : list of K lists of (demonstration, segment)
     places : (K + 1, 2) float array
         Where the law is to start, and its subgoals, m.
+
+    Returns
+    -------
+    SequencedLDS
+        Of K segments.
     """
     segments, speeds = [], []
     for shared, goal in zip(members, places[1:], strict=True):
