@@ -5,7 +5,8 @@ from math import inf, lgamma, log, pi
 import numpy as np
 
 from benchmarks.timing import row, seconds
-from dollop.replication.baseline import draw_demonstrations, merged
+from dollop.lab.drawn import draw_demonstrations
+from dollop.replication.baseline import merged
 
 TASK = np.random.default_rng(0).uniform(-4, 4, (10, 2))  # ten subgoals in a room of 8 m
 CASES = ((10, 0.05, 7), (100, 2.0, 3))  # demonstrations, bound in s, repetitions

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from dollop import matching as module
-from dollop.environment import Environment, integer_costs
+from dollop.environment import Environment, corner_indices, integer_costs
+from dollop.lab.drawn import random_layouts
 from dollop.matching import match, second_best
-from dollop.replication.layouts import matching_shares, random_layouts, right_indices
 
 seeds = st.integers(0, 2**32 - 1)
 shifts = st.tuples(st.floats(-50, 50), st.floats(-50, 50))
@@ -124,26 +124,6 @@ def test_matching_back_is_the_inverse(seed, change):
         np.testing.assert_array_equal(back.indices[there.indices[matched]], np.flatnonzero(matched))
 
 
-def test_the_robust_method_is_right_on_300_layouts_each():
-    """Boxes off by 5 cm, moved by 0.4 m: right in 99, 97, 90 % for 2, 3, 4 cans; the literal method in under half."""
-    shares = matching_shares(noises=(0.05,)).pivot(index="objects", columns="method", values="right")
-    assert (shares["robust"] >= [0.99, 0.97, 0.90]).all()
-    assert (shares["literal"] < 0.5).all()
-
-
-def test_the_robust_method_is_right_where_a_can_is_missing_or_added():
-    """Three cans, one missing or one added: right in 95 % of 300 layouts, in 99 % of those it is confident about."""
-    shares = matching_shares(objects=(3,), noises=(0.05,), changes=("missing", "added"))
-    assert (shares["right"] >= 0.95).all()
-    assert (shares["right_if_confident"] >= 0.99).all()
-
-
-def test_the_robust_method_follows_layouts_that_turned():
-    """Three and four cans turned by a right angle: right in 90 %, the corners turned too."""
-    shares = matching_shares(objects=(3, 4), noises=(0.05,), layouts=150, turn=np.pi / 2, moved=0.15)
-    assert (shares[shares.method == "robust"].right >= 0.9).all()
-
-
 @pytest.mark.parametrize("quarters", [0, 1, -1])
 def test_the_turn_is_found(quarters):
     """An uneven layout of four boxes turned by right angles: the turn is told, corner by corner."""
@@ -153,7 +133,7 @@ def test_the_turn_is_found(quarters):
     x, y = turned.real.reshape(-1, 4), turned.imag.reshape(-1, 4)
     after = Environment(np.stack([x.min(1), y.min(1), x.max(1), y.max(1)], axis=1))
     matching = match(before, after)
-    np.testing.assert_array_equal(matching.indices, right_indices(np.arange(4), quarters * np.pi / 2))
+    np.testing.assert_array_equal(matching.indices, corner_indices(np.arange(4), quarters * np.pi / 2))
     np.testing.assert_allclose(after.corners[matching.indices] @ (1, 1j), turned, atol=1e-12)
     assert matching.turn == pytest.approx(quarters * np.pi / 2, abs=0.05)
 
@@ -215,7 +195,7 @@ def test_thirty_objects_some_gone_are_matched():
     partners = np.full(30, -1)
     partners[order] = np.arange(27)
     before, after = (Environment(np.hstack([c - 0.2, c + 0.2])) for c in (centres, new))
-    np.testing.assert_array_equal(match(before, after).indices, right_indices(partners))
+    np.testing.assert_array_equal(match(before, after).indices, corner_indices(partners))
 
 
 @pytest.mark.parametrize("size", [2, 3, 5, 6])

@@ -5,7 +5,7 @@
     background = record_background(seed=0)    # LaserLog of a drive through the empty laboratory
     recording.save("data/eights.log.gz")      # Recording.load reads it back, without PyBullet
 
-Scenes, walks and saved recordings need no PyBullet; what simulates does (extra `lab`), and says so
+Scenes, walks, saved recordings and what is only drawn need no PyBullet; what simulates does (extra `lab`), and says so
 when it is missing. A module is imported when one of its names is first asked for.
 """
 
@@ -14,6 +14,7 @@ from importlib import import_module
 from dollop.extras import need
 
 HOMES = {
+    "drawn": ["TASKS", "draw_demonstrations", "random_layouts"],
     "person": ["Walk", "figure_eight", "slalom", "walk"],
     "pioneer": ["Pioneer", "laser_pose"],
     "recording": ["Recording"],

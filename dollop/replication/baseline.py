@@ -17,52 +17,11 @@ import pandas as pd
 from tqdm import tqdm
 
 from dollop.cdhmm import SubgoalHMM
+from dollop.lab.drawn import TASKS, draw_demonstrations
 
 __all__ = [
-    "METHODS", "TASKS", "draw_demonstrations", "judge", "merged", "plain_mean", "study", "summary",
+    "METHODS", "judge", "merged", "plain_mean", "study", "summary",
 ]  # fmt: skip
-
-TASKS = {
-    "slalom": ((0.0, 0.0), (1.5, 0.9), (3.0, -0.9), (4.5, 0.9), (6.0, -0.9), (7.5, 0.0)),
-    "figure-eight": ((-2.0, 0.0), (0.0, 0.0), (1.5, 1.2), (3.0, 0.0), (0.0, 0.0), (-1.5, 1.2)),
-    "ring": tuple((2 * np.cos(a), 2 * np.sin(a)) for a in np.arange(6) * np.pi / 3),
-}
-"""The true subgoals of each task in m, six each."""
-
-
-def draw_demonstrations(task, n, spread, extra=0.3, seed=0):
-    """Draw demonstrations of a task: subgoals that scatter, and in some of them one too many.
-
-    A set-up of our own, for the paper compares its learning with nothing. The additional subgoal
-    comes anywhere in the order, before the first and after the last included. Its position is
-    anywhere within the task's bounding box widened by half a metre.
-
-    Parameters
-    ----------
-    task : (K, 2) array_like
-        The true subgoals in m.
-    n : int
-        Number of demonstrations.
-    spread : float
-        Standard deviation of a subgoal along each axis in m.
-    extra : float
-        Probability that a demonstration has one more subgoal.
-    seed : int or numpy.random.Generator
-
-    Returns
-    -------
-    list of (K, 2) or (K + 1, 2) float arrays
-    """
-    task, random = np.asarray(task, float), np.random.default_rng(seed)
-    low, high = task.min(0) - 0.5, task.max(0) + 0.5
-    demonstrations = []
-    for _ in range(n):
-        subgoals = task + random.normal(0, spread, task.shape)
-        position, stray = random.integers(len(task) + 1), random.uniform(low, high)
-        has_one = random.random() < extra
-        demonstrations.append(np.insert(subgoals, position, stray, axis=0) if has_one else subgoals)
-    return demonstrations
-
 
 # ---- what each method takes for the task
 

@@ -3,12 +3,14 @@
 The set-ups are the paper's where it tells them; numbers, seeds and layouts are our own.
 """
 
-from functools import cache, lru_cache
+from dataclasses import dataclass
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from dollop import lab
+from dollop.environment import corner_indices
 from dollop.extras import need
 from dollop.formats.files import check_writable
 from dollop.formats.logs import write_log
@@ -16,7 +18,6 @@ from dollop.gridmap import OccupancyGrid
 from dollop.laps import laps
 from dollop.matching import match
 from dollop.observation import observe
-from dollop.replication.layouts import right_indices
 from dollop.replication.runs import free_poses
 from dollop.robot.avoidance import ObstacleMap
 from dollop.robot.performing import perform
@@ -25,11 +26,11 @@ from dollop.trajectory import arc_length, at_arc_length
 
 __all__ = [
     "LAYOUTS", "SEED", "adapted_task", "background_map", "eight_runs", "empty_lab",
-    "figure_eight_laps", "figure_eight_task", "figure_eights", "figure_eights_observed",
+    "figure_eights",
     "kidnapped_runs", "largest_corner", "matched_right", "matchings_from_laser",
     "moved_environment", "moved_runs", "moved_scene", "nearest", "new_slalom_task",
-    "passing_sides", "same_sides", "save_all", "slalom_demonstration", "slalom_layout",
-    "slalom_recording", "slalom_runs", "slalom_task", "starts_near_the_beginning",
+    "passing_sides", "same_sides", "save_all", "slalom", "slalom_runs", "slalom_task",
+    "starts_near_the_beginning",
 ]  # fmt: skip
 
 SEED = 2004
@@ -37,9 +38,6 @@ SEED = 2004
 
 LAYOUTS = ((0.1, 0.4), (0.0, -0.7)), ((0.9, -0.4), (-0.7, -0.4)), ((-0.4, -0.6), (0.4, 0.3))
 """How far each can is moved in m along x and y, in three ways (Fig. 10)."""
-
-# A study asks for many seeds, one after the other: it keeps a few, and the figures' own.
-some = lru_cache(maxsize=4)
 
 
 def save_all(folder):
@@ -68,8 +66,8 @@ def save_all(folder):
     check_writable(folder / "lab.yaml")
     write_log(folder / "empty_lab.log.gz", empty_lab())
     background_map().save(folder / "lab.yaml")
-    recordings = {"figure_eights": figure_eights(), "moved_cones": moved_cones()}
-    recordings |= {f"slalom_{k}": slalom_recording(k) for k in (0, 1)}
+    recordings = {"figure_eights": figure_eights().recording, "moved_cones": moved_cones()}
+    recordings |= {f"slalom_{k}": slalom(k).recording for k in (0, 1)}
     recordings |= {f"moved_cans_{k}": moved_cans(k) for k in range(len(LAYOUTS))}
     for name, recording in recordings.items():
         recording.save(folder / f"{name}.log.gz")
@@ -101,9 +99,41 @@ def background_map():
 # ---- the figure-eight (Figs 6 and 7)
 
 
-@some
+@dataclass(frozen=True, eq=False)
+class FigureEights:
+    """Five figure-eights round two trash cans, from the laser to the task: each stage made when asked for.
+
+    Attributes
+    ----------
+    recording : Recording
+        What the laser saw, and the truth.
+    observation : Observation
+        What Dollop made of it (Sec. II).
+    laps : list of (N_k, 2) float arrays
+        The five laps in m, cut out of the user's trajectory.
+    task : Task
+        The control law (Sec. III), tied to the two cans (Sec. IV).
+    """
+
+    recording: lab.Recording
+
+    @cached_property
+    def observation(self):
+        return observe(self.recording.log, background_map())
+
+    @cached_property
+    def laps(self):
+        return laps(self.observation.user.t, self.observation.user.positions)
+
+    @cached_property
+    def task(self):
+        return Task.of(Demonstration.of(self.observation))
+
+
+# A study asks for many seeds, one after the other: it keeps a few, and the figures' own.
+@lru_cache(maxsize=4)
 def figure_eights(seed=SEED):
-    """Record five figure-eights round two trash cans (Sec. II).
+    """Simulate the five figure-eights of Fig. 6 (Sec. II).
 
     Parameters
     ----------
@@ -111,56 +141,9 @@ def figure_eights(seed=SEED):
 
     Returns
     -------
-    Recording
+    FigureEights
     """
-    return lab.record_figure_eights(seed)
-
-
-@some
-def figure_eights_observed(seed=SEED):
-    """Observe the five figure-eights (Sec. II).
-
-    Parameters
-    ----------
-    seed : int
-
-    Returns
-    -------
-    Observation
-    """
-    return observe(figure_eights(seed).log, background_map())
-
-
-@some
-def figure_eight_laps(seed=SEED):
-    """The five laps, cut out of the user's trajectory.
-
-    Parameters
-    ----------
-    seed : int
-
-    Returns
-    -------
-    list of (N_k, 2) float arrays
-        In m.
-    """
-    user = figure_eights_observed(seed).user
-    return laps(user.t, user.positions)
-
-
-@some
-def figure_eight_task(seed=SEED):
-    """The task of the five figure-eights (Sec. III), tied to the two cans (Sec. IV).
-
-    Parameters
-    ----------
-    seed : int
-
-    Returns
-    -------
-    Task
-    """
-    return Task.of(Demonstration.of(figure_eights_observed(seed)))
+    return FigureEights(lab.record_figure_eights(seed))
 
 
 @cache
@@ -179,7 +162,7 @@ def eight_runs(control="pursuit", avoid=True, count=10):
     -------
     list of count Run
     """
-    return _runs(figure_eight_task(), figure_eights().scene, SEED, control, avoid, count)
+    return _runs(figure_eights().task, figure_eights().recording.scene, SEED, control, avoid, count)
 
 
 @cache
@@ -198,12 +181,12 @@ def kidnapped_runs(control="pursuit", avoid=True, count=5):
     -------
     list of count Run
     """
-    task, rng = figure_eight_task(), np.random.default_rng([SEED, 7])
+    task, rng = figure_eights().task, np.random.default_rng([SEED, 7])
     starts = starts_near_the_beginning(task, count, rng)
     obstacles = ObstacleMap.of(task.environment, background_map())
     poses = free_poses(count, obstacles, task.law.subgoals[0], rng)
     kidnaps = [[each] for each in zip(rng.uniform(5.0, 25.0, count), poses, strict=True)]
-    return _perform_all(task, figure_eights().scene, starts, kidnaps, control, avoid)
+    return _perform_all(task, figure_eights().recording.scene, starts, kidnaps, control, avoid)
 
 
 def _runs(task, scene, seed, control, avoid, count):
@@ -293,7 +276,7 @@ def adapted_task(k):
     -------
     Task
     """
-    return figure_eight_task().adapt(moved_environment(k))
+    return figure_eights().task.adapt(moved_environment(k))
 
 
 @cache
@@ -329,8 +312,8 @@ def matched_right(k):
     -------
     bool
     """
-    before, after = figure_eight_task().environment, moved_environment(k)
-    truth = _true_indices(before, figure_eights().scene, after, moved_scene(k))
+    before, after = figure_eights().task.environment, moved_environment(k)
+    truth = _true_indices(before, figure_eights().recording.scene, after, moved_scene(k))
     return bool(np.array_equal(match(before, after).indices, truth))
 
 
@@ -338,7 +321,7 @@ def _true_indices(before, old_scene, after, new_scene):
     """The right indices of a matching between what was seen of two scenes with the same objects."""
     old = nearest(before.centres, old_scene.positions)
     new = nearest(after.centres, new_scene.positions)
-    return right_indices(new[old.argsort()])
+    return corner_indices(new[old.argsort()])
 
 
 @cache
@@ -392,8 +375,38 @@ def nearest(points, places):
 # ---- the slalom (Figs 11 and 12)
 
 
-def slalom_layout(k, seed=SEED):
-    """A row of four cones, each moved somewhere else, and a walk past them.
+@dataclass(frozen=True, eq=False)
+class Slalom:
+    """A slalom past four cones that stand somewhere else each time (Fig. 11), made when asked for.
+
+    Attributes
+    ----------
+    scene : Scene
+    walk : Walk
+    noise : list of int
+        Seed of the laser's noise.
+    recording : Recording
+        What the laser saw, and the truth.
+    demonstration : Demonstration
+        What Dollop made of it.
+    """
+
+    scene: lab.Scene
+    walk: lab.Walk
+    noise: list
+
+    @cached_property
+    def recording(self):
+        return lab.record(self.scene, self.walk, self.noise)
+
+    @cached_property
+    def demonstration(self):
+        return Demonstration.of(observe(self.recording.log, background_map()))
+
+
+@lru_cache(maxsize=6)
+def slalom(k, seed=SEED):
+    """Draw a row of cones, each moved somewhere else, and a walk past them.
 
     Parameters
     ----------
@@ -403,7 +416,7 @@ def slalom_layout(k, seed=SEED):
 
     Returns
     -------
-    Scene, Walk
+    Slalom
 
     Raises
     ------
@@ -414,44 +427,10 @@ def slalom_layout(k, seed=SEED):
     for _ in range(100):
         try:
             scene = lab.rearranged(lab.slalom_scene(), rng, reach=0.25, spacing=0.6)
-            return scene, lab.slalom(scene, rng)
+            return Slalom(scene, lab.slalom(scene, rng), [seed, 11, k])
         except ValueError:  # no room to walk among these
             continue
     raise RuntimeError("no layout with room for a slalom in 100 draws")
-
-
-@some
-def slalom_recording(k, seed=SEED):
-    """Record a slalom, in an environment of its own (Fig. 11).
-
-    Parameters
-    ----------
-    k : int
-        Which layout.
-    seed : int
-
-    Returns
-    -------
-    Recording
-    """
-    return lab.record(*slalom_layout(k, seed), [seed, 11, k])
-
-
-@some
-def slalom_demonstration(k, seed=SEED):
-    """A slalom as the laser saw it (Fig. 11).
-
-    Parameters
-    ----------
-    k : int
-        Which layout.
-    seed : int
-
-    Returns
-    -------
-    Demonstration
-    """
-    return Demonstration.of(observe(slalom_recording(k, seed).log, background_map()))
 
 
 @cache
@@ -462,13 +441,13 @@ def slalom_task():
     -------
     Task
     """
-    return learn([slalom_demonstration(0), slalom_demonstration(1)])
+    return learn([slalom(k).demonstration for k in (0, 1)])
 
 
 @cache
 def moved_cones():
     """Recording of the cones in a third layout, nobody walking."""
-    return lab.watch(slalom_layout(2)[0], [SEED, 12])
+    return lab.watch(slalom(2).scene, [SEED, 12])
 
 
 @cache
@@ -498,7 +477,7 @@ def slalom_runs(control="pursuit", avoid=True, count=10):
     -------
     list of count Run
     """
-    return _runs(new_slalom_task(), slalom_layout(2)[0], [SEED, 12], control, avoid, count)
+    return _runs(new_slalom_task(), slalom(2).scene, [SEED, 12], control, avoid, count)
 
 
 # ---- what laws and runs are judged by
@@ -573,6 +552,6 @@ def same_sides(run, task, sides):
     -------
     bool
     """
-    matching = match(slalom_demonstration(0).environment, task.environment)
+    matching = match(slalom(0).demonstration.environment, task.environment)
     cones = task.environment.centres[matching.indices[::4] // 4]
     return bool((passing_sides(run.true_poses[:, :2], cones) == sides).all())

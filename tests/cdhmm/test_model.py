@@ -10,8 +10,8 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import multivariate_normal
 
 from dollop.cdhmm import SubgoalHMM
+from dollop.lab.drawn import TASKS, draw_demonstrations
 from dollop.lds import LDS, Statistics
-from dollop.replication.baseline import TASKS, draw_demonstrations
 
 SLALOM = np.array(TASKS["slalom"])
 

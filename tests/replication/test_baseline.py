@@ -6,10 +6,9 @@ The demonstrations drawn, the judge, the outcome.
 import numpy as np
 import pytest
 
+from dollop.lab.drawn import TASKS, draw_demonstrations
 from dollop.replication.baseline import (
     METHODS,
-    TASKS,
-    draw_demonstrations,
     gaussian_hmm,
     judge,
     merged,
@@ -20,29 +19,6 @@ from dollop.replication.baseline import (
 
 SLALOM = np.array(TASKS["slalom"])
 QUICK = {"merging": merged, "plain mean": plain_mean}
-
-
-def test_demonstrations_scatter_as_told():
-    """Without odd subgoals, the drawn ones have the task as mean, the spread as deviation."""
-    drawn = np.array(draw_demonstrations(SLALOM, 2000, 0.15, extra=0))
-    assert np.allclose(drawn.mean(0), SLALOM, atol=0.02)
-    assert np.allclose(drawn.std(0), 0.15, atol=0.01)
-
-
-def test_odd_subgoals_come_as_often_as_told():
-    """Three in ten demonstrations have one subgoal more, anywhere in the order."""
-    drawn = draw_demonstrations(SLALOM, 2000, 1e-6)
-    longer = [sequence for sequence in drawn if len(sequence) == 7]
-    places = [int(np.argmax(np.linalg.norm(sequence[:6] - SLALOM, axis=1) > 1e-4)) for sequence in longer]
-    assert {len(sequence) for sequence in drawn} == {6, 7}
-    assert len(longer) == pytest.approx(600, abs=70)
-    assert set(places) >= {0, 1, 2, 3, 4, 5}
-
-
-def test_the_same_seed_draws_the_same():
-    """A seed fixes the demonstrations, and further ones do not change the first."""
-    few, more = draw_demonstrations(SLALOM, 3, 0.1, seed=8), draw_demonstrations(SLALOM, 5, 0.1, seed=8)
-    assert all(np.array_equal(a, b) for a, b in zip(few, more, strict=False))
 
 
 def test_judge_knows_number_order_and_error():

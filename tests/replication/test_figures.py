@@ -169,7 +169,7 @@ def test_a_folder_that_cannot_be_made_is_said_before_the_work(tmp_path, capsys):
 @pytest.mark.usefixtures("lab")
 def test_fresh_runs_are_as_near_to_the_law_as_in_figure_7a():
     """Two of its runs: finished, nothing touched, as near to the response within 15 mm."""
-    law = recordings.figure_eight_task().law
+    law = recordings.figure_eights().task.law
     for kind, (_, choices) in CONTROLS.items():
         runs = recordings.eight_runs(*choices, count=2)
         assert [run.finished and not run.collisions for run in runs] == [True, True]
@@ -196,7 +196,7 @@ def test_fresh_runs_among_moved_cans_finish_as_in_figure_10b():
 @pytest.mark.usefixtures("lab")
 def test_fresh_runs_of_the_slalom_pass_the_cones_as_in_figure_12b():
     """Two runs: finished, nothing touched, every cone on the demonstrated side."""
-    task, shown = recordings.new_slalom_task(), recordings.slalom_demonstration(0)
+    task, shown = recordings.new_slalom_task(), recordings.slalom(0).demonstration
     sides = recordings.passing_sides(shown.law.response(), shown.environment.centres)
     runs = recordings.slalom_runs(count=2)
     assert [run.finished and not run.collisions for run in runs] == [True, True]

@@ -55,7 +55,7 @@ def test_the_data_are_what_save_all_writes(tmp_path):
 def test_starts_lie_round_the_beginning():
     """Starts scatter by 0.15 m and 20 degrees round the law's start, heading along it."""
     pytest.importorskip("pybullet")
-    task = recordings.figure_eight_task()
+    task = recordings.figure_eights().task
     starts = recordings.starts_near_the_beginning(task, 500, np.random.default_rng(0))
     np.testing.assert_allclose(starts[:, :2].mean(axis=0), task.law.start, atol=0.03)
     np.testing.assert_allclose(starts.std(axis=0), [0.15, 0.15, np.radians(20)], rtol=0.15)

@@ -8,7 +8,8 @@ from timeit import repeat
 import numpy as np
 from scipy.optimize import linprog
 
-from dollop.environment import integer_costs
+from dollop.environment import corner_indices, integer_costs
+from dollop.lab.drawn import random_layouts
 from dollop.lab.person import figure_eight
 from dollop.lab.scenes import Scene, figure_eight_scene, rearranged
 from dollop.matching import match
@@ -16,7 +17,6 @@ from dollop.observation import observe
 from dollop.replication import recordings
 from dollop.replication.claims.claim import MORE, MOSTLY, NONE, Criterion, claim
 from dollop.replication.claims.measures import clear_of, is_eight, plain_run
-from dollop.replication.layouts import random_layouts, right_indices
 from dollop.task import anchors
 
 __all__ = []
@@ -96,9 +96,10 @@ def number(seed):
     A figure-eight round two cans and three slaloms among four cones. No problem: in fewer than one
     of twenty.
     """
-    eight = len(recordings.figure_eight_task(seed).environment)
-    slaloms = [len(recordings.slalom_demonstration(k, seed).environment) for k in range(3)]
-    return {"other_number": np.mean([eight != 2, *(number != 4 for number in slaloms)])}
+    eight = recordings.figure_eights(seed).task
+    slaloms = [recordings.slalom(k, seed).demonstration for k in range(3)]
+    others = [len(eight.environment) != 2, *(len(each.environment) != 4 for each in slaloms)]
+    return {"other_number": np.mean(others)}
 
 
 @claim(
@@ -113,7 +114,7 @@ def consistent(seed):
 
     The figure-eight's environment is matched to what the laser sees at either look.
     """
-    before = recordings.figure_eight_task(seed).environment
+    before = recordings.figure_eights(seed).task.environment
     looks = in_one_order(moved_eight(seed)[1:])
     numbers = {"seconds": least_time(lambda: match(before, looks[0], method="literal"))}
     for method in ("literal", "robust"):
@@ -159,7 +160,7 @@ def counterintuitive(seed, layouts=10):
         drawn = [random_layouts(3, rng, noise=noise) for _ in range(layouts)]
         for method in ("literal", "robust"):
             wrong = [
-                (match(before, after, method=method).indices != right_indices(partners)).any()
+                (match(before, after, method=method).indices != corner_indices(partners)).any()
                 for before, after, partners in drawn
             ]
             numbers[f"{method}_{name}"] = np.mean(wrong)
@@ -188,7 +189,7 @@ def moved(seed):
     matched; one run under the plain law.
     """
     scene, now, _ = moved_eight(seed)
-    shown = recordings.figure_eight_task(seed)
+    shown = recordings.figure_eights(seed).task
     try:
         task = shown.adapt(now)
     except ValueError:  # an ambiguous matching: it asks instead of guessing
@@ -223,9 +224,9 @@ def single(seed):
     not adapted at all.
     """
     walks, scene, now = one_can_moved(seed)
-    task = recordings.figure_eight_task(seed)
+    task = recordings.figure_eights(seed).task
     matching = match(task.environment, now)
-    law, partners = task.law, matching.indices[::4] // 4
+    law, partners = task.law, matching.partners
     before, after = task.environment.centres[partners >= 0], now.centres[partners[partners >= 0]]
 
     def error(law):

@@ -30,7 +30,8 @@ def parameters(seed):
     second; and beside those of the coarsest polyline with equal steps along the laps' mean that is
     as near to it.
     """
-    walks, law = recordings.figure_eight_laps(seed), recordings.figure_eight_task(seed).law
+    shown = recordings.figure_eights(seed)
+    walks, law = shown.laps, shown.task.law
     mean = mean_trajectory(walks)
     error = distance_to_polyline(mean, law.response()).mean()
     off = (distance_to_polyline(mean, resample(mean, n)).mean() for n in range(2, SHARES))
@@ -57,7 +58,8 @@ def salient(seed):
     At 200 equal shares of the way. The law's speed is the mean speed that is kept for each segment:
     re-timed LDS have none of their own. An LDS fitted to the samples as they are has one.
     """
-    walks, law = recordings.figure_eight_laps(seed), recordings.figure_eight_task(seed).law
+    shown = recordings.figure_eights(seed)
+    walks, law = shown.laps, shown.task.law
     walked, planned = mean_trajectory(walks, SHARES), resample(law.response(), SHARES)
     turns, planned_turns = headings(walked), headings(planned)
     bends, planned_bends = np.gradient(turns), np.gradient(planned_turns)
@@ -95,7 +97,7 @@ def stable(seed):
     rng = np.random.default_rng([seed, 3])
     walks = [rng.normal(size=(rng.integers(3, 60), 2)).cumsum(axis=0) for _ in range(20)]
     fits = [LDS.fit(walk, retimed=retimed) for walk in walks for retimed in (True, False)]
-    law = recordings.figure_eight_task(seed).law
+    law = recordings.figure_eights(seed).task.law
     ends = [law.response(place)[-1] for place in rng.uniform([0, 0], [9, 7], (20, 2))]
     return {
         "margin": 1 - max(np.abs(np.linalg.eigvals(fit.A)).max() for fit in fits),
@@ -116,7 +118,7 @@ def laps(seed):
     Mean distance from a lap that was kept back, the last, to laws fitted to the first and to all
     others.
     """
-    *shown, kept = recordings.figure_eight_laps(seed)
+    *shown, kept = recordings.figure_eights(seed).laps
     alone, several = (SequencedLDS.fit(walks).error(kept) for walks in (shown[:1], shown))
     return {"several_m": several, "alone_more_m": alone - several}
 
@@ -134,7 +136,7 @@ def scaled(seed):
     The largest distance between the two where subgoals and start of the figure-eight's law are
     scaled by 0.5 to 2 and shifted by up to 3 m.
     """
-    rng, law = np.random.default_rng([seed, 4]), recordings.figure_eight_task(seed).law
+    rng, law = np.random.default_rng([seed, 4]), recordings.figure_eights(seed).task.law
     factor, shift = rng.uniform(0.5, 2.0), rng.uniform(-3, 3, 2)
     wanted = factor * law.response() + shift
     given = law.with_subgoals(factor * law.subgoals + shift, factor * law.start + shift).response()
@@ -154,7 +156,8 @@ def figure(seed):
 
     Winding numbers of the law's response round both cans.
     """
-    law, scene = recordings.figure_eight_task(seed).law, recordings.figure_eights(seed).scene
+    shown = recordings.figure_eights(seed)
+    law, scene = shown.task.law, shown.recording.scene
     return {"eight": is_eight(law, scene), "clearance_m": clear_of(law, scene)}
 
 
@@ -174,7 +177,8 @@ def segments(seed):
     Five figure-eights. The tolerance bounds the mean error of each segment, and the number of LDS
     follows from it; so the error cannot exceed 20 mm and is no criterion.
     """
-    walks, law = recordings.figure_eight_laps(seed), recordings.figure_eight_task(seed).law
+    shown = recordings.figure_eights(seed)
+    walks, law = shown.laps, shown.task.law
     return {
         "n_segments": float(len(law.segments)),
         "n_at_10_mm": float(len(SequencedLDS.fit(walks, tolerance=0.010).segments)),

@@ -11,9 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from dollop.cdhmm import SubgoalHMM
+from dollop.lab.drawn import TASKS, draw_demonstrations
 from dollop.lds import LDS
 from dollop.replication import recordings
-from dollop.replication.baseline import TASKS, draw_demonstrations, merged
+from dollop.replication.baseline import merged
 from dollop.replication.claims.claim import MORE, MOSTLY, Criterion, claim
 from dollop.replication.claims.measures import plain_run
 from dollop.robot.performing import Unicycle, perform
@@ -137,14 +138,14 @@ def slaloms(seed):
         `shown` and `kept` (Demonstration), `both` and `alone` (Task, adapted to the third layout),
         `scene` of the third; None where the layouts cannot be matched with confidence.
     """
-    *shown, kept = (recordings.slalom_demonstration(k, seed) for k in range(3))
+    *walked, third = (recordings.slalom(k, seed) for k in range(3))
+    shown, kept = [each.demonstration for each in walked], third.demonstration
     try:
         both = learn(shown).adapt(kept.environment)
         alone = [Task.of(each).adapt(kept.environment) for each in shown]
     except ValueError:  # an ambiguous matching: it asks instead of guessing
         return None
-    scene, _ = recordings.slalom_layout(2, seed)
-    return SimpleNamespace(shown=shown, kept=kept, both=both, alone=alone, scene=scene)
+    return SimpleNamespace(shown=shown, kept=kept, both=both, alone=alone, scene=third.scene)
 
 
 @claim(

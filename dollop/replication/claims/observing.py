@@ -38,7 +38,8 @@ __all__ = ["choose_noises"]
 
 def walked(seed):
     """The user's track over the five figure-eights of a seed, and their recording."""
-    return recordings.figure_eights_observed(seed).user, recordings.figure_eights(seed)
+    shown = recordings.figure_eights(seed)
+    return shown.observation.user, shown.recording
 
 
 def true_places(t, recording):
@@ -483,7 +484,8 @@ def fastest(seed):
     Our additions: only visible objects can become the user, and another one takes over only after
     having been faster by 0.3 m/s for 0.5 s.
     """
-    recording, alone = recordings.figure_eights(seed), recordings.figure_eights_observed(seed)
+    shown = recordings.figure_eights(seed)
+    recording, alone = shown.recording, shown.observation
     both = observe(with_stroller(recording, seed).log, recordings.background_map())
     t = recording.log.t
     expected = expected_centroids(alone.user, recording, t)
@@ -553,4 +555,4 @@ def loss(seed):
     The tracks of `interpolation`, five laps each. Wanted: the 95 % interval (Wilson) of the paper's
     one in five demonstrations.
     """
-    return {"lost_per_lap": min(recordings.figure_eights_observed(seed).losses, 5) / 5}
+    return {"lost_per_lap": min(recordings.figure_eights(seed).observation.losses, 5) / 5}

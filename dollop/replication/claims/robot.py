@@ -40,7 +40,7 @@ def follow(seed):
     degrees (standard deviations) off. Fairly close: 0.1 m on average, the robot's radius of 0.25 m
     at most.
     """
-    task = recordings.figure_eight_task(seed)
+    task = recordings.figure_eights(seed).task
     (start,) = recordings.starts_near_the_beginning(task, 1, np.random.default_rng([seed, 5]))
     run = plain_run(task, start)
     away = distances_to_law(run, task.law)
@@ -61,7 +61,8 @@ def luck(seed):
     Five runs under the plain law, each kidnapped once to anywhere in the laboratory: obstacles,
     furniture and walls. Back: within 0.1 m of the response for a second.
     """
-    law, runs = recordings.figure_eight_task(seed).law, kidnapped_runs(seed)
+    shown, runs = kidnapped_runs(seed)
+    law = shown.task.law
     hits = [run.collisions > 0 for run in runs]
     before = [run.collisions > 0 and return_time(run, law) == inf for run in runs]
     return {
@@ -85,7 +86,7 @@ def state(seed):
     A run under the plain law with and without the cans, its subgoals being where they were;
     directions of all pairs of segments at fifty places.
     """
-    task = recordings.figure_eight_task(seed)
+    task = recordings.figure_eights(seed).task
     (start,) = recordings.starts_near_the_beginning(task, 1, np.random.default_rng([seed, 5]))
     bare = replace(task, environment=Environment(np.empty((0, 4))))
     runs = [plain_run(each, start) for each in (task, bare)]
@@ -122,13 +123,13 @@ def kidnap(seed):
     the end round the cans as the law of the demonstrations. The user's direction: at the nearest
     place of the laps that belongs to the segment in force.
     """
-    task, scene = recordings.figure_eight_task(seed), recordings.figure_eights(seed).scene
-    runs = kidnapped_runs(seed)
+    shown, runs = kidnapped_runs(seed)
+    task, scene = shown.task, shown.recording.scene
     times = np.array([return_time(run, task.law) for run in runs])
     back = np.isfinite(times)
     unhurt = [run for run in runs if run.finished and not run.collisions]
     goes_on = [winds_as_demonstrated(run, task.law, scene) for run in unhurt]
-    user = user_directions(recordings.figure_eight_laps(seed), task.law)
+    user = user_directions(shown.laps, task.law)
     off = [heading_off(run, min(time, 60.0), *user) for run, time in zip(runs, times, strict=True)]
     return {
         "returned": back.mean(),
@@ -141,13 +142,15 @@ def kidnap(seed):
 
 @lru_cache(maxsize=1)
 def kidnapped_runs(seed, count=KIDNAPPINGS):
-    """Five runs, each kidnapped once to anywhere in the laboratory."""
-    task, rng = recordings.figure_eight_task(seed), np.random.default_rng([seed, 6])
+    """What was shown, and five runs, each kidnapped once to anywhere in the laboratory."""
+    shown, rng = recordings.figure_eights(seed), np.random.default_rng([seed, 6])
+    task = shown.task
     starts = recordings.starts_near_the_beginning(task, count, rng)
     obstacles = ObstacleMap.of(task.environment, recordings.background_map())
     places = free_poses(count, obstacles, task.law.subgoals[0], rng)
     kidnaps = zip(starts, rng.uniform(5.0, 25.0, count), places, strict=True)
-    return [plain_run(task, start, kidnap=[(time, place)]) for start, time, place in kidnaps]
+    runs = [plain_run(task, start, kidnap=[(time, place)]) for start, time, place in kidnaps]
+    return shown, runs
 
 
 def first_hit(run):

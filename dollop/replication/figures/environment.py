@@ -33,7 +33,7 @@ def figure_8():
     h (7) it goes to. The two costs have different units; the margin says how far behind the
     second-best matching is.
     """
-    before, after = recordings.figure_eight_task().environment, recordings.moved_environment(0)
+    before, after = recordings.figure_eights().task.environment, recordings.moved_environment(0)
     literal, robust = match(before, after, method="literal"), match(before, after)
     aside = Environment(after.boxes + np.tile(ASIDE, 2))
     figure, ax = plt.subplots(figsize=(8, 5.4))
@@ -71,7 +71,7 @@ def matching_numbers(before, after):
 
 def outwards(environment):
     """For each corner (4N, 2) which way along x and y leads out of its box: +1 or -1."""
-    return np.sign(environment.corners - np.repeat(environment.centres, 4, axis=0))
+    return np.sign(environment.corner_offsets)
 
 
 def label_corners(ax, environment, names, away):
@@ -91,7 +91,7 @@ def figure_9():
     one: this is why the literal matching hangs on the boxes' sizes. The numbers are those of Figure
     8; the literal matching is what these springs lead to.
     """
-    environment = recordings.figure_eight_task().environment
+    environment = recordings.figure_eights().task.environment
     corners = environment.corners
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.2), width_ratios=(3, 1))
     for ax in (left, right):
@@ -124,7 +124,7 @@ def figure_10a():
     Grey dotted boxes and grey crosses: before; solid boxes and black crosses: now. The robot found
     the moved cans with its own laser. The figure-eight still goes round both.
     """
-    task, grid = recordings.figure_eight_task(), recordings.background_map()
+    task, grid = recordings.figure_eights().task, recordings.background_map()
     figure, axes = plt.subplots(1, len(LAYOUTS), figsize=(WIDE, 3), sharey=True)
     dotted = {"linestyle": ":", "linewidth": 1.5}
     grey = {"color": plot.BACKGROUND, "markeredgewidth": 1.5, "label": "subgoals before"}

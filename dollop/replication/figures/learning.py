@@ -120,9 +120,9 @@ def figure_11b():
 
 def draw_demonstration(k):
     """A demonstration as the laser saw it, and what it is made of."""
-    recording, shown = recordings.slalom_recording(k), recordings.slalom_demonstration(k)
+    scene, shown = recordings.slalom(k).scene, recordings.slalom(k).demonstration
     figure, ax = plt.subplots(figsize=SIZE)
-    plot.workspace(recordings.background_map(), recording.scene.robot, shown.environment.boxes, ax)
+    plot.workspace(recordings.background_map(), scene.robot, shown.environment.boxes, ax)
     (walk,) = shown.trajectory
     plot.law(ax, shown.law.response(), linewidth=4, alpha=0.6)
     plot.path(ax, walk, "user's track", linewidth=1)
@@ -188,6 +188,6 @@ def passed_rightly(runs):
     Not asked of the plain law's runs: a robot that backs off the cone it touched faces any way
     there.
     """
-    shown = recordings.slalom_demonstration(0)
+    shown = recordings.slalom(0).demonstration
     sides = recordings.passing_sides(shown.law.response(), shown.environment.centres)
     return sum(recordings.same_sides(run, recordings.new_slalom_task(), sides) for run in runs)

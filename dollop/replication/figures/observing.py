@@ -102,7 +102,7 @@ def figure_3():
     The robot sits at the bottom. Every dot is where a beam ended; behind each can and behind the
     user lies a shadow. Nothing in the scan says which dots are a person.
     """
-    log = recordings.figure_eights().log
+    log = recordings.figure_eights().recording.log
     figure, ax = plt.subplots(figsize=(6, 4.7))
     i = scan_beside_the_cans(log)
     plot.scan(ax, log, i)
@@ -128,8 +128,8 @@ def figure_4():
     what stands still. A second, slower grid forgets the user and keeps the static objects. The two
     stages of the slower grid are drawn after the whole recording, all others at one moment of it.
     """
-    recording, grid = recordings.figure_eights(), recordings.background_map()
-    log, observation = recording.log, recordings.figure_eights_observed()
+    shown, grid = recordings.figure_eights(), recordings.background_map()
+    log, observation = shown.recording.log, shown.observation
     i = scan_beside_the_cans(log)
     figure, axes = plt.subplots(2, 4, figsize=(10, 5.2), sharex=True, sharey=True)
     figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
@@ -208,7 +208,7 @@ def figure_5():
 
     Two trash cans about four metres apart among desks and stools; the robot watches from the wall.
     """
-    return drawing.picture(lab.render_lab(recordings.figure_eights().scene)), {}
+    return drawing.picture(lab.render_lab(recordings.figure_eights().recording.scene)), {}
 
 
 SIZE = (6, 5.2)
@@ -222,7 +222,8 @@ def figure_6a():
     is no error of tracking: a laser sees only the near side of a body. The track error is what
     remains without it.
     """
-    recording, observation = recordings.figure_eights(), recordings.figure_eights_observed()
+    shown = recordings.figure_eights()
+    recording, observation = shown.recording, shown.observation
     user, sensor = observation.user, recording.log.poses[0]
     figure, ax = plt.subplots(figsize=SIZE)
     plot.workspace(recordings.background_map(), sensor, observation.environment.boxes, ax)

@@ -26,8 +26,9 @@ def figure_6b():
     some subgoals it has a corner: each segment is fitted without regard to the next, and its
     response arrives along the direction in which it is slowest. The paper: 6 LDS, 20 mm on average.
     """
-    robot, task = recordings.figure_eights().log.poses[0], recordings.figure_eight_task()
-    law, laps = task.law, recordings.figure_eight_laps()
+    shown = recordings.figure_eights()
+    robot, task = shown.recording.log.poses[0], shown.task
+    law, laps = task.law, shown.laps
     figure, ax = plt.subplots(figsize=SIZE)
     plot.workspace(recordings.background_map(), robot, task.environment.boxes, ax)
     for k, lap in enumerate(laps):
@@ -75,7 +76,7 @@ def figure_7a():
 
 def draw_both(work):
     """A figure of the figure-eight's runs under both kinds of control, and these runs by kind."""
-    task, runs_of = recordings.figure_eight_task(), by_kind(work)
+    task, runs_of = recordings.figure_eights().task, by_kind(work)
     figure, axes = plt.subplots(1, 2, figsize=PAIR, sharey=True)
     for ax, (kind, (title, _)) in zip(axes, CONTROLS.items(), strict=True):
         draw_runs(ax, task, runs_of[kind], title)
@@ -85,7 +86,7 @@ def draw_both(work):
 
 def how_near(runs):
     """How far the runs are from the response, and their estimated poses from the true ones."""
-    law = recordings.figure_eight_task().law
+    law = recordings.figure_eights().task.law
     distances = np.concatenate([distances_to_law(run, law) for run in runs])
     places, turns = np.transpose([pose_errors(run) for run in runs])
     return {
@@ -120,7 +121,7 @@ def figure_7b():
 
 def how_soon(runs):
     """Mean time in s until the kidnapped robots are back on the response, None if none ever is."""
-    law = recordings.figure_eight_task().law
+    law = recordings.figure_eights().task.law
     times = np.concatenate([return_times(run, law) for run in runs])
     back = times[np.isfinite(times)]
     return {"return_time_s": back.mean() if len(back) else None}
