@@ -18,7 +18,9 @@ STOPPED = 130
 
 
 def main(arguments=None):
-    """Run one command; a bad file or value, or Ctrl-C, ends it with one line instead of a
+    """Run one command; what is refused, or interrupted, ends with one line.
+
+    A bad file or value, or Ctrl-C, ends it with one line instead of a
     traceback.
 
     Parameters
