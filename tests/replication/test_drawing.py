@@ -1,4 +1,4 @@
-"""What only figures and notebooks draw with: pictures to the pixel, and one legend for several axes."""
+"""What only figures and notebooks draw with: pictures to the pixel, one legend for many axes."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""Measures of runs: how far from the law, when back on it after a kidnapping, and starts anywhere that is free."""
+"""Measures of runs: how far from the law, when back on it, and starts anywhere that is free."""
 
 from types import SimpleNamespace
 
@@ -20,16 +20,17 @@ def task():
 
 
 def test_return_times(task):
-    """The time until the robot keeps to its response again: none where it would be anyway, some beside it."""
+    """Until the robot keeps to its response again: at once where it would be anyway, else later."""
     undisturbed = perform(task, Unicycle(START))
-    runs = [perform(task, Unicycle(START), kidnap=[(8.0, p)]) for p in (undisturbed.poses[80], (4.5, 5.8, 0.0))]
+    places = undisturbed.poses[80], (4.5, 5.8, 0.0)
+    runs = [perform(task, Unicycle(START), kidnap=[(8.0, place)]) for place in places]
     assert return_times(runs[0], task.law) == pytest.approx([0.0], abs=1e-9)
     assert 0.5 < return_times(runs[1], task.law)[0] < 20
     assert runs[0].kidnapped == pytest.approx([8.0])
 
 
 def test_return_times_by_hand(task):
-    """Back after 1 s; kidnapped again before; back after 2 s, a touch of half a second not counting; ended before."""
+    """Back after 1 s; kidnapped before; back after 2 s, half a second not counting; ended before."""
     response, t = task.law.response(), np.arange(110) / 10
     across = (response[41] - response[39]) @ [[0, 1], [-1, 0]]
     beside = response[40] + 0.15 * across / np.hypot(*across)
@@ -37,12 +38,13 @@ def test_return_times_by_hand(task):
     places[0] = task.law.start
     places[(t >= 2) & (t < 3) | (t >= 4) & (t < 6) | (t >= 10) & (t < 10.5)] += [0.0, 5.0]
     places[(t >= 6) & (t < 7) | (t >= 7.5) & (t < 8)] = beside
-    run = SimpleNamespace(true_poses=np.c_[places, 0 * t], t=t, kidnapped=np.array([2.0, 4.0, 6.0, 10.0]))
+    kidnapped = np.array([2.0, 4.0, 6.0, 10.0])
+    run = SimpleNamespace(true_poses=np.c_[places, 0 * t], t=t, kidnapped=kidnapped)
     np.testing.assert_allclose(return_times(run, task.law), [1.0, np.inf, 2.0, np.inf])
 
 
 def test_crossing_the_response_is_not_coming_back(task):
-    """A robot put on a part of the response that it is not heading along leaves it at once, and is not back yet."""
+    """A robot put across its response leaves it at once, and is not back yet."""
     response = task.law.response(START[:2])
     run = perform(task, Unicycle(START), kidnap=[(8.0, (*response[len(response) // 2], 0.0))])
     (time,) = return_times(run, task.law)
@@ -51,7 +53,7 @@ def test_crossing_the_response_is_not_coming_back(task):
 
 
 def test_free_poses_are_free_and_everywhere(task):
-    """Poses have the room asked for, in every corner of the map that can be reached, and head anywhere."""
+    """They have the room asked for, lie wherever the robot can get, and head anywhere."""
     background = room_map()
     obstacles = ObstacleMap.of(task.environment, background)
     poses = free_poses(300, obstacles, task.law.subgoals[0], seed=0, room=0.3)

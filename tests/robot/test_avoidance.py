@@ -1,4 +1,4 @@
-"""The obstacle-aware modulation: unchanged where nothing is near, never into an obstacle, always out of a trap."""
+"""Going round obstacles: nothing changes where nothing is near, and every trap has a way out."""
 
 import numpy as np
 import pytest
@@ -43,10 +43,11 @@ def test_inside_is_negative():
 
 
 def test_unknown_and_beyond_the_map_are_obstacles():
-    """With a background, what no beam has seen is not driven on, and neither is the map's border."""
+    """What no beam has seen is not driven on, and neither is the border of the map."""
     occupancy = np.zeros((100, 100))
     occupancy[40:60, 40:60] = np.nan
-    obstacles = ObstacleMap.of(Environment(np.empty((0, 4))), OccupancyGrid(occupancy, (0.0, 0.0), 0.05))
+    grid = OccupancyGrid(occupancy, (0.0, 0.0), 0.05)
+    obstacles = ObstacleMap.of(Environment(np.empty((0, 4))), grid)
     assert obstacles.edge(2.5, 2.5) < -0.25
     assert obstacles.edge(0.3, 2.5) < 0.05
     assert obstacles.holds(4.99, 0.01) and not obstacles.holds(5.01, 0.01)
@@ -75,19 +76,20 @@ def test_unchanged_when_leaving(place, angle):
 
 @given(places, angles)
 def test_modulation_is_the_formula(place, angle):
-    """Within the influence: (1 - 1/Gamma) along the normal, (1 + 1/Gamma) along the tangent, brought to unit length."""
+    """Within the influence: 1 - 1/Gamma along the normal, 1 + 1/Gamma along the tangent."""
     edge, nx, ny = BOX._edge_and_slope(*place)
     n, u = np.array([nx, ny]) / max(np.hypot(nx, ny), 1e-12), np.array(unit(angle))
     if edge < INFLUENCE and n @ u < -1e-6 and np.hypot(nx, ny) > 0.1:
         share = (INFLUENCE - edge) / (INFLUENCE - KEPT)
         turned = (1 - share) * (n @ u) * n + (1 + share) * (u - (n @ u) * n)
         if np.hypot(*turned) > 1e-6:
-            assert BOX.modulate(*place, *u) == pytest.approx(tuple(turned / np.hypot(*turned)), abs=1e-6)
+            expected = tuple(turned / np.hypot(*turned))
+            assert BOX.modulate(*place, *u) == pytest.approx(expected, abs=1e-6)
 
 
 @given(places, angles)
 def test_never_towards_what_is_at_the_kept_distance(place, angle):
-    """At the kept distance or nearer, the modulated direction, of unit length, does not point into the obstacle."""
+    """At the kept distance or nearer, the direction has unit length and leads out, or along."""
     edge, nx, ny = BOX._edge_and_slope(*place)
     if edge <= KEPT and nx * nx + ny * ny > 0.5:
         ux, uy = BOX.modulate(*place, *unit(angle))
@@ -97,7 +99,7 @@ def test_never_towards_what_is_at_the_kept_distance(place, angle):
 
 @given(angles, angles)
 def test_flow_keeps_clear_of_a_convex_obstacle(bearing, offset):
-    """Straight flows towards a place behind the box go round it and never nearer than about the kept distance."""
+    """Straight flows towards a place behind the box go round it, at about the kept distance."""
     x, y = 2.5 * np.cos(bearing), 2.5 * np.sin(bearing)
     goal = (-2.5 * np.cos(bearing + offset / 4), -2.5 * np.sin(bearing + offset / 4))
     for _ in range(300):
@@ -111,7 +113,7 @@ def test_flow_keeps_clear_of_a_convex_obstacle(bearing, offset):
 
 @given(places, angles, st.floats(0.3, 3.0))
 def test_speed_limit_uses_the_room_there_is(place, theta, deceleration):
-    """One period at the limit and then braking takes all the room; with none, it creeps outwards or stands."""
+    """A period at the limit and then braking takes all the room; with none, it creeps outwards."""
     limit = BOX.speed_limit(*place, theta, deceleration, 0.1)
     edge, nx, ny = BOX._edge_and_slope(*place)
     if edge > 0.02:
@@ -121,7 +123,7 @@ def test_speed_limit_uses_the_room_there_is(place, theta, deceleration):
 
 
 def test_geodesic_is_the_distance_in_the_open():
-    """Where nothing is near, the way is the straight one, but for the eight directions of a grid (8 %)."""
+    """Where nothing is near, the way is straight, but for the eight directions of a grid (8 %)."""
     far = ObstacleMap.of(Environment([[-9, -9, -8, -8]]), places=[[0, 0], [4, 3]])
     way = Geodesic(far, (0.0, 0.0))
     for place in ((3.0, 0.0), (2.0, 2.0), (4.0, 1.5)):
@@ -142,7 +144,7 @@ def test_geodesic_against_brute_force():
 
 
 def test_geodesic_leads_out_of_a_trap():
-    """From inside a U, where turning along the wall comes to a halt, the way leads out, round and to the goal."""
+    """From inside a U, where turning along the wall comes to a halt, it leads round to the goal."""
     obstacles = ObstacleMap.of(Environment(np.empty((0, 4))), trap())
     way, (x, y) = Geodesic(obstacles, (7.0, 3.0)), (4.0, 3.0)
     for _ in range(600):
@@ -153,17 +155,19 @@ def test_geodesic_leads_out_of_a_trap():
 
 
 def test_the_way_keeps_off_what_may_be_occupied():
-    """Cells from an occupancy of 0.2 on and the map's border are obstacles, on a map that begins anywhere."""
+    """Cells from an occupancy of 0.2 on and the border are obstacles, wherever the map begins."""
     occupancy = np.zeros((60, 120))
     occupancy[28:32, 20:100] = 0.25
-    obstacles = ObstacleMap.of(Environment(np.empty((0, 4))), OccupancyGrid(occupancy, (1.0, -2.0), 0.05))
+    grid = OccupancyGrid(occupancy, (1.0, -2.0), 0.05)
+    obstacles = ObstacleMap.of(Environment(np.empty((0, 4))), grid)
     way, (x, y), nearest = Geodesic(obstacles, (6.5, 0.5)), (1.5, -1.5), np.inf
     for _ in range(400):
         ux, uy = way.direction(x, y)
         x, y = x + 0.02 * ux, y + 0.02 * uy
         nearest = min(nearest, obstacles.edge(x, y))
     assert np.hypot(x - 6.5, y - 0.5) < 0.1 and nearest > 0.06
-    assert obstacles.edge(4.0, -0.5) < -0.25 and obstacles.edge(1.3, -1.5) == pytest.approx(0.0, abs=0.01)
+    assert obstacles.edge(4.0, -0.5) < -0.25
+    assert obstacles.edge(1.3, -1.5) == pytest.approx(0.0, abs=0.01)
 
 
 def test_geodesic_to_a_walled_place():

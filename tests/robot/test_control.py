@@ -1,4 +1,4 @@
-"""The supervisory control law: the direction of the LDS, handing over in order and in finite time, for real robots."""
+"""The supervisory control law: the direction of the LDS, and segments that hand over in order."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,16 @@ from dollop.gridmap import OccupancyGrid
 from dollop.lds import LDS, Statistics
 from dollop.pose import wrapped
 from dollop.robot.avoidance import ObstacleMap
-from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, REACH, STEP, Guidance, Limits, bend_speeds, clip
+from dollop.robot.control import (
+    CONTROL_LAWS,
+    PIONEER_LIMITS,
+    REACH,
+    STEP,
+    Guidance,
+    Limits,
+    bend_speeds,
+    clip,
+)
 from dollop.robot.performing import Unicycle
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import distance_to_polyline
@@ -27,9 +36,14 @@ def law():
 def random_law(seed):
     """Two to four segments, each fitted to a random walk: nothing like what a person would do."""
     rng = np.random.default_rng(seed)
-    walks = [rng.normal(0, 0.4, (rng.integers(4, 30), 2)).cumsum(axis=0) for _ in range(rng.integers(2, 5))]
-    segments = [LDS.fit(walk - walk[-1] + rng.uniform(-2, 2, 2), retimed=bool(rng.random() < 0.5)) for walk in walks]
-    return SequencedLDS(tuple(segments), rng.uniform(-2, 2, 2), rng.uniform(0.1, 1.5, len(segments)))
+    count = rng.integers(2, 5)
+    walks = [rng.normal(0, 0.4, (rng.integers(4, 30), 2)).cumsum(axis=0) for _ in range(count)]
+    segments = []
+    for walk in walks:
+        there = walk - walk[-1] + rng.uniform(-2, 2, 2)
+        segments.append(LDS.fit(there, retimed=bool(rng.random() < 0.5)))
+    start, speeds = rng.uniform(-2, 2, 2), rng.uniform(0.1, 1.5, len(segments))
+    return SequencedLDS(tuple(segments), start, speeds)
 
 
 def straight_law(*goals, speed=0.3):
@@ -47,7 +61,7 @@ def trap():
 
 
 def drive(law, control, pose, limit=4000):
-    """Periods until the law is done, and the segments in force; None if it gives up or takes too long."""
+    """The segments in force until the law is done; None if it gives up or takes too long."""
     robot = Unicycle(pose)
     supervisor, active = CONTROL_LAWS[control](Guidance(law), law.speeds, robot), []
     while not supervisor.done:
@@ -77,7 +91,7 @@ def test_direction_is_that_of_the_lds(law):
 
 @given(seeds, st.floats(-5, 5), st.floats(-5, 5))
 def test_remaining_falls_along_the_direction(seed, x, y):
-    """A small step along the law lessens the Lyapunov measure, for any fitted segment and from anywhere."""
+    """A small step along the law lessens the Lyapunov measure, from anywhere."""
     guidance = Guidance(random_law(seed))
     here = guidance.remaining(0, x, y)
     ux, uy = guidance.direction(0, x, y)
@@ -88,7 +102,7 @@ def test_remaining_falls_along_the_direction(seed, x, y):
 @settings(max_examples=60)
 @given(seeds, st.tuples(st.floats(-20, 20), st.floats(-20, 20)))
 def test_no_start_and_no_sequence_makes_the_response_diverge(seed, start):
-    """Whatever was fitted and wherever it starts, the response stays within the bound of its Lyapunov functions."""
+    """Whatever was fitted, the response stays within the bound of its Lyapunov functions."""
     law = random_law(seed)
     state, steps = np.array(start), 0
     for segment in law.segments:
@@ -102,7 +116,7 @@ def test_no_start_and_no_sequence_makes_the_response_diverge(seed, start):
 
 @pytest.mark.parametrize("control", sorted(CONTROL_LAWS))
 def test_every_segment_hands_over_in_finite_time(control):
-    """Whatever was fitted, from any pose: the robot, with its limits, gets through all segments in order."""
+    """Whatever was fitted, from any pose, the robot gets through all segments in order."""
     rng = np.random.default_rng(0)
     for seed in range(40):
         law = random_law(seed)
@@ -154,23 +168,25 @@ def test_bend_speeds_on_a_circle():
     angle = np.arange(100) * STEP / 0.4
     places = 0.4 * np.column_stack([np.cos(angle), np.sin(angle)])
     limits = Limits(2.0, 0.8, 0.5, 1.5)
-    assert bend_speeds(places, np.full(100, 2.0), limits)[20:80] == pytest.approx(np.full(60, 0.64 * 0.4), rel=0.01)
+    speeds = bend_speeds(places, np.full(100, 2.0), limits)[20:80]
+    assert speeds == pytest.approx(np.full(60, 0.64 * 0.4), rel=0.01)
 
 
 @given(seeds)
 def test_bend_speeds_can_be_braked_for(seed):
-    """Whatever the path, the speed never falls faster than the robot can brake, nor exceeds the demonstrated one."""
+    """Whatever the path, the speed falls no faster than the robot can brake."""
     rng = np.random.default_rng(seed)
     headings = rng.normal(0, 0.5, 60).cumsum()
     places = STEP * np.column_stack([np.cos(headings), np.sin(headings)]).cumsum(axis=0)
     speeds = bend_speeds(places, np.full(60, 0.5), PIONEER_LIMITS)
     assert (speeds <= 0.5 + 1e-12).all() and (speeds > 0).all()
-    assert (speeds[:-1] ** 2 - speeds[1:] ** 2 <= 2 * PIONEER_LIMITS.acceleration * STEP + 1e-9).all()
+    falls = speeds[:-1] ** 2 - speeds[1:] ** 2
+    assert (falls <= 2 * PIONEER_LIMITS.acceleration * STEP + 1e-9).all()
 
 
 @pytest.mark.parametrize("error", [-2.0, -1.21, -1.19, -0.2, 0.0, 0.2, 1.0, 1.19, 1.21, 2.0])
 def test_commands_are_the_formulas(error):
-    """Plain: s cos e and 3 e; pursuit: the circle through the point 0.35 m ahead; both first turn where e is sharp."""
+    """Plain: s cos e and 3 e; pursuit: the circle through the point ahead; sharp: turn first."""
     pose = (1.0, 2.0, np.arctan2(2, 4) - error)
     commands = {
         name: kind(Guidance(straight_law((5, 4))), [0.3], Unicycle(pose)).command(*pose)
@@ -189,24 +205,27 @@ def test_commands_are_the_formulas(error):
 @pytest.mark.parametrize("control", sorted(CONTROL_LAWS))
 @pytest.mark.parametrize(("demonstrated", "driven"), [(0.01, 0.1), (0.3, 0.3), (2.0, 0.5)])
 def test_speeds_are_brought_into_the_robots_range(control, demonstrated, driven):
-    """Straight on, the robot drives as the user did, but neither below 0.1 m/s nor above its limit."""
+    """Straight on, it drives as the user did, but not below 0.1 m/s nor above its limit."""
     pose = (0.0, 0.0, 0.0)
-    supervisor = CONTROL_LAWS[control](Guidance(straight_law((5, 0))), [demonstrated], Unicycle(pose))
+    guidance = Guidance(straight_law((5, 0)))
+    supervisor = CONTROL_LAWS[control](guidance, [demonstrated], Unicycle(pose))
     assert supervisor.command(*pose) == pytest.approx((driven, 0.0))
 
 
 def test_near_an_obstacle_it_can_still_brake():
-    """The speed is the wanted one or what the obstacle map allows there, whichever is less; from far to contact."""
+    """The speed is the wanted one, or what the obstacle map allows there if that is less."""
     obstacles = ObstacleMap.of(Environment([[2.0, -3.0, 2.2, 3.0]]), places=[[5, 0]])
-    supervisor = CONTROL_LAWS["plain"](Guidance(straight_law((5, 0)), obstacles), [0.5], Unicycle((0.0, 0.0, 0.0)))
+    guidance = Guidance(straight_law((5, 0)), obstacles)
+    supervisor = CONTROL_LAWS["plain"](guidance, [0.5], Unicycle((0.0, 0.0, 0.0)))
     places = np.linspace(0, 2, 41)
     limits = np.array([obstacles.speed_limit(x, 0.0, 0.0, 0.5, 0.1) for x in places])
-    assert [supervisor.safe(0.5, x, 0.0, 0.0) for x in places] == pytest.approx(np.minimum(limits, 0.5))
+    safe = [supervisor.safe(0.5, x, 0.0, 0.0) for x in places]
+    assert safe == pytest.approx(np.minimum(limits, 0.5))
     assert limits.max() > 0.6 and limits.min() == 0
 
 
 def test_the_way_leads_out_of_a_trap_and_to_every_subgoal():
-    """Where the response comes to a halt in a U, a detour takes its place; the way touches nothing, skips nothing."""
+    """Where the response comes to a halt in a U, a detour takes its place, and skips nothing."""
     guidance = Guidance(straight_law((4, 3), (7, 3), (7, 5)), trap())
     places, segments = guidance.way(0, 1.0, 3.0)
     places, segments = np.array(places), np.array(segments)
@@ -218,7 +237,7 @@ def test_the_way_leads_out_of_a_trap_and_to_every_subgoal():
 
 
 def test_the_way_ends_where_there_is_none():
-    """A subgoal behind a wall: the way holds the segments before it and nothing of it, not 100 m of wandering."""
+    """Before a subgoal behind a wall it ends, and does not wander on for 100 m."""
     wall = np.zeros((120, 160))
     wall[:, 100:104] = 1
     obstacles = ObstacleMap.of(Environment([]), OccupancyGrid(wall, (0.0, 0.0), 0.05))
@@ -229,9 +248,10 @@ def test_the_way_ends_where_there_is_none():
 
 @pytest.mark.parametrize("control", sorted(CONTROL_LAWS))
 def test_without_progress_it_slows_down_and_gives_up(control):
-    """Held fast, the pace is halved every eight seconds; below a sixteenth, after the fifth time, it is hopeless."""
+    """Held fast, the pace is halved every eight seconds; below a sixteenth it is hopeless."""
     pose = (0.0, 0.0, 0.0)
-    supervisor, paces = CONTROL_LAWS[control](Guidance(straight_law((5, 0))), [0.3], Unicycle(pose)), []
+    guidance, paces = Guidance(straight_law((5, 0))), []
+    supervisor = CONTROL_LAWS[control](guidance, [0.3], Unicycle(pose))
     while not supervisor.hopeless and len(paces) < 1000:
         supervisor.command(*pose)
         paces.append(supervisor.pace)
@@ -241,8 +261,9 @@ def test_without_progress_it_slows_down_and_gives_up(control):
 
 
 def test_first_a_detour_and_only_then_slower():
-    """Among obstacles the first thing to change is the way, the second the pace; a new segment begins afresh."""
-    supervisor = CONTROL_LAWS["plain"](Guidance(straight_law((7, 3), (7, 5)), trap()), [0.3, 0.3], Unicycle((4, 3, 0)))
+    """Among obstacles first the way is changed, then the pace; a new segment begins afresh."""
+    guidance = Guidance(straight_law((7, 3), (7, 5)), trap())
+    supervisor = CONTROL_LAWS["plain"](guidance, [0.3, 0.3], Unicycle((4, 3, 0)))
     supervisor.insist()
     assert supervisor.pace == 1.0 and list(supervisor.guidance.detours) == [0]
     supervisor.insist()
@@ -254,7 +275,8 @@ def test_first_a_detour_and_only_then_slower():
 @pytest.mark.parametrize(("jump", "pace"), [(0.28, 0.5), (0.32, 1.0)])
 def test_a_kidnapped_robot_begins_its_segment_afresh(jump, pace):
     """Farther than any robot drives in a period it was carried: full pace and no detour again."""
-    supervisor = CONTROL_LAWS["plain"](Guidance(straight_law((7, 3)), trap()), [0.3], Unicycle((4, 3, 0)))
+    guidance = Guidance(straight_law((7, 3)), trap())
+    supervisor = CONTROL_LAWS["plain"](guidance, [0.3], Unicycle((4, 3, 0)))
     supervisor.command(4.0, 3.0, 0.0)
     supervisor.insist()
     supervisor.insist()

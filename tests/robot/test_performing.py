@@ -37,7 +37,7 @@ def kidnappings(task, background):
 
 
 class Recorded(Unicycle):
-    """Remembers its commands; believes to be elsewhere, knows its pose or feels something at the periods it is told."""
+    """Remembers its commands; astray, lost or touching something at the periods it is told."""
 
     def __init__(self, pose, astray=(0.0, 0.0), lost=(), felt=None):
         self.commands, self.astray, self.lost, self.felt = [], astray, lost, felt
@@ -86,12 +86,13 @@ def test_unicycle_keeps_its_limits():
     for _ in range(300):
         robot.drive(*rng.normal(0, 3, 2))
         assert abs(robot.speed) <= 0.5 and abs(robot.turn) <= 0.8
-        assert abs(robot.speed - before[0]) <= 0.05 + 1e-12 and abs(robot.turn - before[1]) <= 0.157 + 1e-12
+        assert abs(robot.speed - before[0]) <= 0.05 + 1e-12
+        assert abs(robot.turn - before[1]) <= 0.157 + 1e-12
         before = robot.speed, robot.turn
 
 
 def test_unicycle_drives_circles():
-    """At constant v and omega the robot comes back after 2 pi / omega on a circle of radius v / omega."""
+    """At constant v and omega it comes back after 2 pi / omega on a circle of radius v / omega."""
     robot = Unicycle((0.0, 0.0, 0.0), Limits(1.0, 1.0, 1e3, 1e3), period=2 * np.pi / 100)
     ys = []
     for _ in range(100):
@@ -121,7 +122,7 @@ def test_runs_are_repeatable(task, background):
 
 @pytest.mark.parametrize(("control", "bound"), [("plain", 0.080), ("pursuit", 0.040)])
 def test_distance_to_the_law(task, background, control, bound):
-    """Within the Pioneer's limits the mean distance to the response is at most 80 mm, 40 mm when it is pursued."""
+    """The mean distance to the response is at most 80 mm, and 40 mm when it is pursued."""
     starts = np.array(START) + np.random.default_rng(0).normal(0, 0.15, (10, 3))
     runs = [perform(task, Unicycle(start), control, background=background) for start in starts]
     assert all(run.finished and run.collisions == 0 for run in runs)
@@ -138,7 +139,7 @@ def test_avoidance_leaves_a_free_run_as_it_is(task, control):
 
 @pytest.mark.parametrize("control", ["plain", "pursuit"])
 def test_kidnapped_anywhere_it_finishes_without_collision(task, background, kidnappings, control):
-    """Fifty kidnappings anywhere free at any time: all finish, and with avoidance none touches anything."""
+    """Fifty kidnappings anywhere free: all runs finish, and none touches anything."""
     for kidnapping in kidnappings:
         run = perform(task, Unicycle(START), control, background=background, kidnap=[kidnapping])
         assert run.finished, (kidnapping, run.reason)
@@ -146,7 +147,7 @@ def test_kidnapped_anywhere_it_finishes_without_collision(task, background, kidn
 
 
 def test_without_avoidance_it_finishes_and_some_runs_hit(task, background, kidnappings):
-    """The paper's law gets there as well, through what stands in its way: no hit was a coincidence."""
+    """The paper's law gets there through what stands in its way: no hit was a coincidence."""
     runs = [perform(task, Unicycle(START), "plain", False, background, [k]) for k in kidnappings]
     assert all(run.finished for run in runs)
     assert 0 < sum(run.collisions > 0 for run in runs) < 50
@@ -156,28 +157,31 @@ def test_collisions_are_counted_once_each(task):
     """Crossing a box on the way counts as one collision, however long it lasts."""
     law = task.law
     box = np.concatenate([law.subgoals[0] - 0.3, law.subgoals[0] - 0.1])
-    run = perform(SimpleNamespace(law=law, environment=Environment([box])), Unicycle(START), "plain", avoid=False)
+    there = SimpleNamespace(law=law, environment=Environment([box]))
+    run = perform(there, Unicycle(START), "plain", avoid=False)
     assert run.finished and run.collisions == 1 and run.clearance.min() < 0
 
 
 def test_it_goes_round_what_stands_on_its_way(task):
-    """A box on the middle of a segment is gone round, and the subgoals stay where the segments hand over."""
+    """A box on the middle of a segment is gone round, and the segments hand over as before."""
     middle = np.array([5.8, 2.8])
     assert distance_to_polyline(middle[None], task.law.response()) < 0.1
     environment = Environment(np.vstack([CANS, [*(middle - 0.15), *(middle + 0.15)]]))
     for control in ("plain", "pursuit"):
-        run = perform(SimpleNamespace(law=task.law, environment=environment), Unicycle(START), control)
+        there = SimpleNamespace(law=task.law, environment=environment)
+        run = perform(there, Unicycle(START), control)
         assert run.finished and run.collisions == 0
         handed_over = run.poses[1:][np.diff(run.active) > 0, :2]
         assert np.hypot(*(handed_over - task.law.subgoals[:-1]).T).max() < 0.4
 
 
 def test_it_comes_out_of_a_trap(task, background):
-    """Kidnapped into a niche between two boxes against the wall, it takes the way that leads out."""
+    """Kidnapped into a niche between two boxes against the wall, it takes the way out."""
     niche = np.array([[2.0, 6.3, 4.0, 7.0], [4.9, 5.2, 5.1, 7.0], [3.2, 5.2, 4.1, 5.4]])
     there = SimpleNamespace(law=task.law, environment=Environment(np.vstack([CANS, niche])))
     for control in ("plain", "pursuit"):
-        run = perform(there, Unicycle(START), control, background=background, kidnap=[(5.0, (4.5, 6.4, 1.0))])
+        kidnap = [(5.0, (4.5, 6.4, 1.0))]
+        run = perform(there, Unicycle(START), control, background=background, kidnap=kidnap)
         assert run.finished and run.collisions == 0, (control, run.reason)
 
 
@@ -190,10 +194,11 @@ def test_a_stuck_robot_gives_up(task, background):
 
 
 def test_a_walled_subgoal_is_given_up(task, background):
-    """A subgoal behind a wall from side to side cannot be reached: the robot stops with a reason, and hits nothing."""
+    """A subgoal behind a wall cannot be reached: the robot says so, and hits nothing."""
     wall = Environment([[5.4, 0.0, 5.6, 7.0]])
     for control in ("plain", "pursuit"):
-        run = perform(SimpleNamespace(law=task.law, environment=wall), Unicycle(START), control, background=background)
+        there = SimpleNamespace(law=task.law, environment=wall)
+        run = perform(there, Unicycle(START), control, background=background)
         assert not run.finished and "no progress" in run.reason and run.collisions == 0
 
 
@@ -205,17 +210,18 @@ def test_time_is_limited(task):
 
 
 def test_until_it_knows_where_it_is_it_looks_round(task):
-    """It turns on the spot at half a radian a second; what counts is how long it has been lost at a stretch."""
+    """It turns on the spot; what counts is how long it has been lost at a stretch."""
     lost = [*range(0, 80), *range(81, 160)]
     robot = Recorded(START, lost=lost)
     run = perform(task, robot, localise_within=10.0)
-    assert run.finished and not run.localised[lost].any() and run.localised[80] and run.localised[160:].all()
+    assert run.finished and not run.localised[lost].any()
+    assert run.localised[80] and run.localised[160:].all()
     assert {robot.commands[k] for k in lost} == {(0.0, 0.5)}
     assert robot.commands[-1] == (0.0, 0.0) and len(robot.commands) == len(run.t)
 
 
 def test_a_robot_that_never_knows_where_it_is_gives_up(task):
-    """Having turned on the spot for the time it is given, it is told to stop, and has not moved from its place."""
+    """Having turned on the spot for the time it is given, it is told to stop where it was."""
     robot = Recorded(START, lost=range(1000))
     run = perform(task, robot, localise_within=10.0)
     assert not run.finished and run.reason == "the robot has not known where it is for 10 s"
@@ -225,23 +231,26 @@ def test_a_robot_that_never_knows_where_it_is_gives_up(task):
 
 
 def test_what_happened_is_told_from_the_true_pose(task):
-    """A robot that is 0.4 m off where it believes to be: clearance and distance to the law are those of the truth."""
+    """Of a robot that is 0.4 m astray, clearance and distance to the law are those of the truth."""
     run = perform(task, Recorded(START, astray=(0.3, -0.4)), control="plain", avoid=False)
-    np.testing.assert_allclose(run.true_poses[:, :2] - run.poses[:, :2], np.tile([0.3, -0.4], (len(run.t), 1)))
-    away = np.maximum(CANS[:, :2] - run.true_poses[:, None, :2], run.true_poses[:, None, :2] - CANS[:, 2:])
-    np.testing.assert_allclose(run.clearance, np.hypot(*np.maximum(away, 0).T).min(axis=0) - 0.25, atol=0.06)
-    response = task.law.response(run.true_poses[0, :2])
-    np.testing.assert_allclose(distances_to_law(run, task.law), distance_to_polyline(run.true_poses[:, :2], response))
+    places = run.true_poses[:, :2]
+    off = places - run.poses[:, :2]
+    np.testing.assert_allclose(off, np.tile([0.3, -0.4], (len(off), 1)))
+    away = np.maximum(CANS[:, :2] - places[:, None], places[:, None] - CANS[:, 2:]).clip(0)
+    clearance = np.hypot(*away.T).min(axis=0) - 0.25
+    np.testing.assert_allclose(run.clearance, clearance, atol=0.06)
+    distances = distance_to_polyline(places, task.law.response(places[0]))
+    np.testing.assert_allclose(distances_to_law(run, task.law), distances)
 
 
 def test_collisions_are_what_is_felt(task):
-    """A robot that can feel: touching from period 5 to 8 and again at 12 is two collisions, however near things are."""
+    """Touching from period 5 to 8 and again at 12 is two collisions, however near things are."""
     assert perform(task, Recorded(START, felt=(5, 6, 7, 8, 12))).collisions == 2
     assert perform(task, Recorded(START, felt=())).collisions == 0
 
 
 def test_it_is_kidnapped_when_and_where_it_is_told(task):
-    """The schedule is kept whatever its order: at 3 s and 6 s the robot is at those poses, and the run records when."""
+    """Whatever the order of the schedule, at 3 s and 6 s the robot is at those poses."""
     kidnap = [(6.0, (2.0, 2.0, 1.0)), (3.0, (5.0, 5.5, -1.0))]
     run = perform(task, Unicycle(START), kidnap=kidnap)
     np.testing.assert_allclose(run.poses[[30, 60]], [kidnap[1][1], kidnap[0][1]])
@@ -278,7 +287,7 @@ class Own:
 
 
 def test_a_robot_of_ones_own_performs(task):
-    """Pose, localised, limits, period and drive are enough; the poses it believes are then all there is."""
+    """Pose, localised, limits, period and drive are enough; what it believes is all there is."""
     run = perform(task, Own(START))
     assert run.finished
     np.testing.assert_array_equal(run.poses, run.true_poses)
@@ -305,7 +314,7 @@ def test_a_lost_robot_backs_away_from_what_it_touches(task):
 
 
 def test_a_lost_robot_tries_the_other_way():
-    """Backing off that does not help turns into going forth, and after contact it goes on for a second."""
+    """Backing off that does not help turns into going forth; after contact it goes on for 1 s."""
     search = Search(0.1)
     pressed = [search.command(True)[0] for _ in range(50)]
     assert pressed[:18] == [-0.1] * 18 and pressed[22:38] == [0.1] * 16
@@ -321,8 +330,8 @@ def test_a_lost_robot_tries_the_other_way():
         ({"kidnap": [(3.0, (3.0, 6.6, 0.0))]}, "kidnapping at 3 s must be free"),
         ({"kidnap": [(3.0, (np.nan, 2.0, 0.0))]}, "kidnapping at 3 s must be finite"),
         ({"kidnap": [(3.0, (20.0, 2.0, 0.0))]}, "kidnapping at 3 s must lie in the lab"),
-        ({"kidnap": [(np.nan, (3.0, 2.0, 0.0))]}, "the time of a kidnapping must be finite and not negative, got nan"),
-        ({"kidnap": [(-1.0, (3.0, 2.0, 0.0))]}, "the time of a kidnapping must be finite and not negative, got -1"),
+        ({"kidnap": [(np.nan, (3.0, 2.0, 0.0))]}, "kidnapping must be finite and not .*, got nan"),
+        ({"kidnap": [(-1.0, (3.0, 2.0, 0.0))]}, "kidnapping must be .* not negative, got -1"),
         ({"robot": Unicycle((7.5, 0.3, 0.0))}, "the start must be free"),
         ({"robot": Unicycle((4.0, np.nan, 0.0))}, "the start must be finite"),
         ({"robot": Unicycle((4.0, -5.0, 0.0))}, "the start must lie in the lab"),
@@ -354,16 +363,20 @@ def test_subgoals_must_be_free(task, background, place, message):
 
 def test_inputs_are_not_changed(task, background):
     """Performing leaves law, map, environment and schedule as they were."""
-    subgoals, occupancy, kidnap = task.law.subgoals.copy(), background.occupancy.copy(), [(3.0, (2.0, 2.0, 0.0))]
+    subgoals, occupancy = task.law.subgoals.copy(), background.occupancy.copy()
+    kidnap = [(3.0, (2.0, 2.0, 0.0))]
     perform(task, Unicycle(START), background=background, kidnap=kidnap)
     assert (task.law.subgoals == subgoals).all() and (background.occupancy == occupancy).all()
     assert (task.environment.boxes == CANS).all() and kidnap == [(3.0, (2.0, 2.0, 0.0))]
 
 
 @pytest.mark.parametrize("control", ["plain", "pursuit"])
-@pytest.mark.parametrize("place", [(7.31, 0.55, -0.79), (7.19, 0.57, -2.81), (7.49, 0.5, 1.15), (7.25, 0.68, 1.61)])
+@pytest.mark.parametrize(
+    "place",
+    [(7.31, 0.55, -0.79), (7.19, 0.57, -2.81), (7.49, 0.5, 1.15), (7.25, 0.68, 1.61)],
+)
 def test_the_way_out_of_a_niche_is_found(task, control, place):
-    """Put between desks and a stool, with 8 cm to spare round a bend, the robot gets out and touches nothing."""
+    """Put between desks and a stool, with 8 cm to spare, it gets out and touches nothing."""
     lab = OccupancyGrid.load(DATA / "lab.yaml")
     run = perform(task, Unicycle(START), control, background=lab, kidnap=[(28.0, place)])
     assert run.finished and not run.collisions
