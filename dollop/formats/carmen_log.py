@@ -210,9 +210,9 @@ def _numbers(fields):
 def write_log(path, log):
     """Write scans as a CARMEN log of ROBOTLASER1 messages, which state the laser's geometry.
 
-    Ranges are written to 1 mm, poses and times to six decimals, as CARMEN does (`writelog.c`);
-    `inf` becomes the maximum range. The log holds the laser only: its pose stands for the robot's
-    too.
+    Ranges are written to 1 mm and times to 1 us, as CARMEN does (`writelog.c`); poses in full, for
+    a microradian takes a beam along a cell's border to its other side. `inf` becomes the maximum
+    range. The log holds the laser only: its pose stands for the robot's too.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def write_log(path, log):
         text.write(b"# CARMEN Logfile\n# distances in m, angles in rad, times in s\n")
         for t, ranges, pose in zip(log.t, _written_ranges(log), log.poses, strict=True):
             numbers = " ".join([f"{value:.3f}" for value in ranges.tolist()])
-            place = " ".join([f"{value:.6f}" for value in pose.tolist()])
+            place = " ".join(map(repr, pose.tolist()))
             ending = f"{place} {place} 0 0 0 0 0 {t:.6f} dollop {t - log.t[0]:.6f}"
             text.write(f"{head} {numbers} 0 {ending}\n".encode())
 

@@ -51,7 +51,7 @@ def assert_equal_to_precision(read, log):
     finite = np.isfinite(log.ranges)
     assert np.abs(read.ranges[finite] - log.ranges[finite]).max(initial=0) <= 0.001 + 1e-9
     np.testing.assert_allclose(read.t, log.t, atol=1e-6)
-    np.testing.assert_allclose(read.poses, log.poses, atol=1e-6)
+    np.testing.assert_array_equal(read.poses, log.poses)
     np.testing.assert_allclose(read.angles, log.angles, atol=1e-12)
     assert read.max_range == log.max_range
 
