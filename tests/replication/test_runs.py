@@ -30,7 +30,7 @@ def test_return_times(task):
 
 
 def test_return_times_by_hand(task):
-    """Back after 1 s; kidnapped before; back after 2 s, half a second not counting; ended before."""
+    """Back after 1 s; kidnapped before; back after 2 s, half of one not counting; ended before."""
     response, t = task.law.response(), np.arange(110) / 10
     across = (response[41] - response[39]) @ [[0, 1], [-1, 0]]
     beside = response[40] + 0.15 * across / np.hypot(*across)

@@ -1,5 +1,6 @@
 """Performing: the robots' limits, runs that finish or say why not, kidnappings, and bad input."""
 
+from inspect import ismodule
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from places import DATA
 from rooms import CANS, figure_eight_task, room_map
 
+from dollop import robot
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.replication.runs import distances_to_law, free_poses
@@ -77,6 +79,13 @@ class Dreamer(Unicycle):
         self.periods += 1
         if self.periods == 20:
             self.pose = (np.nan, *self.pose[1:])
+
+
+def test_the_wing_has_one_door_that_hides_no_module():
+    """What a user needs of a robot comes from dollop.robot, where modules stay modules."""
+    assert all(hasattr(robot, name) for name in robot.__all__)
+    assert robot.perform is perform and robot.Unicycle is Unicycle
+    assert all(ismodule(module) for module in (robot.avoidance, robot.control, robot.performing))
 
 
 def test_unicycle_keeps_its_limits():
