@@ -34,7 +34,7 @@ check: .venv/ready  ## lint and formatting
 	$(RUN) -m nbstripout --verify notebooks/*.ipynb
 
 study: .venv/ready  ## test the paper's claims over a hundred seeds; goes on where it was
-	$(RUN) -m dollop.cli study
+	$(RUN) -m dollop study
 
 bench: .venv/ready  ## benchmarks beside plain baselines, one thread
 	$(RUN) -m benchmarks
@@ -43,7 +43,7 @@ book: .venv/ready  ## execute the notebooks and lay them out as HTML pages in bu
 	$(RUN) book/build.py
 
 data: .venv/ready  ## remake the recordings in data/ that the notebooks read
-	$(RUN) -m dollop.cli data
+	$(RUN) -m dollop data
 
 clean:  ## remove .venv and caches; figures and recordings stay
 	rm -rf .venv build *.egg-info .pytest_cache .hypothesis .ruff_cache

@@ -51,15 +51,14 @@ SI units throughout; a pose is (x, y, theta); time comes first in every array.
 from dollop.association import Association, Frames, associate, associate_with_frames
 from dollop.cdhmm import SubgoalHMM
 from dollop.environment import Environment
-from dollop.formats.files import FormatError
-from dollop.formats.logs import read_log, write_log
+from dollop.formats import FormatError, read_log, write_log
 from dollop.gridmap import OccupancyGrid
 from dollop.laps import laps
 from dollop.laser import LaserLog
 from dollop.lds import LDS
 from dollop.matching import Matching, match
 from dollop.observation import Observation, observe
-from dollop.robot.performing import Run, Unicycle, perform
+from dollop.robot import Run, Unicycle, perform
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
 from dollop.tracking import Motion, Track, Tracker
@@ -67,32 +66,8 @@ from dollop.tracking import Motion, Track, Tracker
 __version__ = "0.1.0"
 
 __all__ = [
-    "LDS",
-    "Association",
-    "Demonstration",
-    "Environment",
-    "FormatError",
-    "Frames",
-    "LaserLog",
-    "Matching",
-    "Motion",
-    "Observation",
-    "OccupancyGrid",
-    "Run",
-    "SequencedLDS",
-    "SubgoalHMM",
-    "Task",
-    "Track",
-    "Tracker",
-    "Unicycle",
-    "__version__",
-    "associate",
-    "associate_with_frames",
-    "laps",
-    "learn",
-    "match",
-    "observe",
-    "perform",
-    "read_log",
-    "write_log",
-]
+    "LDS", "Association", "Demonstration", "Environment", "FormatError", "Frames", "LaserLog",
+    "Matching", "Motion", "Observation", "OccupancyGrid", "Run", "SequencedLDS", "SubgoalHMM",
+    "Task", "Track", "Tracker", "Unicycle", "__version__", "associate", "associate_with_frames",
+    "laps", "learn", "match", "observe", "perform", "read_log", "write_log",
+]  # fmt: skip

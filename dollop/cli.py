@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import dollop
+from dollop.formats.files import check_writable, whole_file
+from dollop.gridmap import check_is_map
 from dollop.trajectory import arc_length
 
 __all__ = ["main", "replication"]
@@ -110,13 +112,10 @@ def replication(module):
 
 def _map(options):
     """dollop map LOG MAP"""
-    from dollop.formats.files import check_writable
-    from dollop.gridmap import OccupancyGrid, check_is_map
-
     check_is_map(options.map)
     check_writable(options.map)
     log = dollop.read_log(options.log, options.topic)
-    OccupancyGrid.from_log(log, options.resolution).save(options.map)
+    dollop.OccupancyGrid.from_log(log, options.resolution).save(options.map)
     print(f"wrote {options.map}")
 
 
@@ -138,8 +137,6 @@ def _observe(options):
 
 def _outputs(options):
     """Paths of the trajectory and its picture, if both can be written and cover no input."""
-    from dollop.formats.files import check_writable
-
     out = Path(options.out)
     if out.suffix != ".csv":
         raise ValueError(f"--out must be named .csv (its picture, .png, lands beside it), got {out}")
@@ -155,8 +152,6 @@ def _write_track(user, path):
     """The user's trajectory as a table."""
     import pandas as pd
 
-    from dollop.formats.files import whole_file
-
     table = pd.DataFrame(user.positions, columns=["x", "y"])
     table.insert(0, "t", user.t)
     table["occluded"] = user.occluded
@@ -169,7 +164,6 @@ def _draw_observation(found, background, path):
     import matplotlib.pyplot as plt
 
     from dollop import plot
-    from dollop.formats.files import whole_file
 
     with plot.style():
         figure, ax = plt.subplots()
@@ -191,7 +185,3 @@ def _data(options):
 def _study(options):
     """dollop study [CLAIM ...]"""
     replication("study").command(options)
-
-
-if __name__ == "__main__":
-    main()
