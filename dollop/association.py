@@ -174,8 +174,7 @@ def associate(subgoals, environment, m=4):
     if len(corners) == 0:
         raise ValueError("subgoals need an environment of at least 1 object, got 0")
     if m not in range(1, len(corners) + 1):
-        rule = f"a whole number between 1 and the number of corners {len(corners)}"
-        raise ValueError(f"m must be {rule}, got {m}")
+        raise ValueError(f"m must be a whole number between 1 and the number of corners {len(corners)}, got {m}")
     differences = subgoals[:, None] - corners
     squares = (differences**2).sum(axis=2)
     nearest = np.argsort(squares, axis=1, kind="stable")[:, :m]

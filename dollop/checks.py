@@ -126,8 +126,7 @@ def checked_positions(name, values):
     positions = checked_array(name, values, "N", 2)
     farthest = np.abs(positions).max(initial=0)
     if farthest > FARTHEST:
-        rule = f"must lie within {FARTHEST:g} m of the origin"
-        raise ValueError(f"{name} {rule}, got {farthest:g} m")
+        raise ValueError(f"{name} must lie within {FARTHEST:g} m of the origin, got {farthest:g} m")
     return positions
 
 

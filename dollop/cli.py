@@ -141,8 +141,7 @@ def _outputs(options):
     if out.suffix != ".csv":
         raise ValueError(f"--out must be named .csv (its picture, .png, lands beside it), got {out}")
     if out.with_suffix("").resolve() == Path(options.map).with_suffix("").resolve():
-        rule = "--out must have another name than the map, whose picture it may replace"
-        raise ValueError(f"{rule}, got {out}")
+        raise ValueError(f"--out must have another name than the map, whose picture it may replace, got {out}")
     for path in (out, out.with_suffix(".png")):
         check_writable(path)
     return out, out.with_suffix(".png")

@@ -99,8 +99,7 @@ def laps(t, positions):
     """
     t, points = np.asarray(t, float), check_trajectory(positions, "positions")
     if t.shape != (len(points),) or not (np.diff(t) > 0).all():
-        rule = "t must increase and hold one time per position"
-        raise ValueError(f"{rule}, got shape {t.shape} for {len(points)}")
+        raise ValueError(f"t must increase and hold one time per position, got shape {t.shape} for {len(points)}")
     period = np.median(np.diff(t))
     even = t[0] + period * np.arange(int((t[-1] - t[0]) / period + 1.5))
     points = np.stack([np.interp(even, t, column) for column in points.T], axis=1)

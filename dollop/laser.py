@@ -85,5 +85,4 @@ def _check_increasing(name, values):
     falls = np.flatnonzero(np.diff(values) <= 0)
     if falls.size:
         before, after = values[falls[0] : falls[0] + 2]
-        place = f"at index {falls[0] + 1}"
-        raise ValueError(f"{name} must increase, got {before} and then {after} {place}")
+        raise ValueError(f"{name} must increase, got {before} and then {after} at index {falls[0] + 1}")

@@ -172,8 +172,7 @@ class LDS:
         walks = check_trajectories(trajectories)
         samples = [retime(walk, STEPS, DECAY) if retimed else walk for walk in walks]
         first, *others = map(Statistics.of, samples)
-        goal = np.mean([walk[-1] for walk in walks], axis=0)
-        return cls(sum(others, first), goal)
+        return cls(sum(others, first), np.mean([walk[-1] for walk in walks], axis=0))
 
     def turned(self, angle):
         """The LDS turned about its subgoal: A becomes R A R^T.

@@ -145,11 +145,9 @@ def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4
     check_positive("moved", moved)
     counts = f"{len(environment_i)} and {len(environment_j)}"
     if min(len(environment_i), len(environment_j)) < 2:
-        rule = "each environment needs at least 2 objects"
-        raise ValueError(f"matching compares layouts: {rule}, got {counts}")
+        raise ValueError(f"matching compares layouts: each environment needs at least 2 objects, got {counts}")
     if method == "literal" and len(environment_i) != len(environment_j):
-        rule = "is a bijection and needs the same number of objects"
-        raise ValueError(f"the literal method {rule}, got {counts}")
+        raise ValueError(f"the literal method is a bijection and needs the same number of objects, got {counts}")
     if method == "literal":
         return _match_literally(environment_i, environment_j)
     return _match_robustly(environment_i, environment_j, left_out, moved)

@@ -1,8 +1,9 @@
 """The drawing vocabulary: one colour per meaning, and the plane in metres.
 
 What is in the room has colours of Okabe and Ito's palette, what is compared in graphs has those of
-Tol's: colour-blind readers can tell them apart. Red boxes, green law and yellow robot are also the
-paper's. Black is for what is neutral: subgoals, corners, readings, writing.
+Tol's: colour-blind readers can tell them apart. Green law and yellow robot are also the paper's,
+whose red boxes are vermilion here. Black is for what is neutral: subgoals, corners, readings,
+writing.
 
 Everything is drawn into axes that are given; a label goes into their legend once.
 """
@@ -15,6 +16,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Circle, Ellipse, Rectangle
 from matplotlib.patheffects import withStroke
 
+from dollop.foreground import endpoints
 from dollop.trajectory import arc_length
 
 USER = "#0072B2"  # blue: the user's track
@@ -201,10 +203,8 @@ def scan(ax, log, i, label="laser scan"):
         Which of its scans.
     label : str, optional
     """
-    x, y, theta = log.poses[i]
-    back = np.isfinite(log.ranges[i])
-    reach, bearings = log.ranges[i, back], theta + log.angles[back]
-    xs, ys = x + reach * np.cos(bearings), y + reach * np.sin(bearings)
+    x, y, _ = log.poses[i]
+    xs, ys = endpoints(log)[i, np.isfinite(log.ranges[i])].T
     rays = np.stack([np.full_like(xs, x), xs]), np.stack([np.full_like(ys, y), ys])
     ax.plot(*rays, color=_RAY, linewidth=0.5)
     ax.plot(xs, ys, ".", color="black", markersize=3, label=label)
@@ -319,7 +319,7 @@ def _first_contact(run):
 
 
 def cdhmm(ax, model, sd=2.0):
-    """A CDHMM in the plane: its states, the steps between them, and its most-likely path in red.
+    """A CDHMM in the plane: its states, the steps between them, and its most-likely path in crimson.
 
     Parameters
     ----------

@@ -196,8 +196,7 @@ def update(means, covariances, measurements, measurement_sd):
     gain = covariances[:, :, 0] / (covariances[:, 0, 0] + measurement_sd**2)[:, None]
     innovation = measurements - means[:, 0]
     means = means + gain[:, :, None] * innovation[:, None]
-    covariances = covariances - gain[:, :, None] * covariances[:, None, 0, :]
-    return means, covariances
+    return means, covariances - gain[:, :, None] * covariances[:, None, 0, :]
 
 
 def match_greedily(cost, gate):

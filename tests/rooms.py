@@ -6,6 +6,7 @@ import numpy as np
 
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
+from dollop.robot.avoidance import Geodesic
 from dollop.sequenced_lds import SequencedLDS
 
 WIDTH, DEPTH, SIDE = 9.0, 7.0, 0.05
@@ -51,3 +52,13 @@ def figure_eight(samples=240):
 def figure_eight_task():
     """The figure-eight as a task: its law, and the two cans as its environment."""
     return SimpleNamespace(law=SequencedLDS.fit(figure_eight()), environment=Environment(CANS))
+
+
+def free_poses(count, obstacles, goal, seed, room=0.05):
+    """Poses (count, 3) anywhere on a map with that much room in m, from which the goal is reached."""
+    rng, reachable, poses = np.random.default_rng(seed), Geodesic(obstacles, goal), []
+    while len(poses) < count:
+        x, y, theta = rng.uniform([0.0, 0.0, -np.pi], [WIDTH, DEPTH, np.pi])
+        if obstacles.edge(x, y) > room and np.isfinite(reachable.distance(x, y)):
+            poses.append((x, y, theta))
+    return np.array(poses)

@@ -15,15 +15,7 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
-from dollop.cdhmm.alignment import (
-    LEAST_COVERAGE,
-    align_chain,
-    coverage_of,
-    estimate_structure,
-    numbered,
-    path_through,
-    set_apart,
-)
+from dollop.cdhmm import alignment
 from dollop.cdhmm.evidence import END, FIRST, START, chains_of, evidence_of, graph_of, outer_products
 from dollop.checks import checked_positions
 
@@ -114,10 +106,10 @@ class SubgoalHMM:
         if not sequences:
             raise ValueError("sequences must hold at least one demonstration, got none")
         if not LEAST_SPREAD <= spread <= MOST_SPREAD:
-            limits = f"between {LEAST_SPREAD:g} and {MOST_SPREAD:g} m"
-            raise ValueError(f"spread must lie {limits}, got {spread}")
+            raise ValueError(f"spread must lie between {LEAST_SPREAD:g} and {MOST_SPREAD:g} m, got {spread}")
         chains = chains_of(sequences, spread)
-        labels = numbered(set_apart(estimate_structure(chains), chains), chains)
+        labels = alignment.set_apart(alignment.estimate_structure(chains), chains)
+        labels = alignment.numbered(labels, chains)
         return cls._of(labels, chains, sequences, spread)
 
     @classmethod
@@ -167,7 +159,7 @@ class SubgoalHMM:
         (L,) int array
             In order, so that they grow.
         """
-        return path_through(*self._grown()) - FIRST
+        return alignment.path_through(*self._grown()) - FIRST
 
     def coverage(self):
         """The share of the most-likely path that each demonstration visits (beyond the paper).
@@ -177,7 +169,7 @@ class SubgoalHMM:
         (D,) float array
             Of D demonstrations, between 0 and 1.
         """
-        return coverage_of(self.states, self.most_likely_path())
+        return alignment.coverage_of(self.states, self.most_likely_path())
 
     def outliers(self):
         """Demonstrations that do something else: they visit less than half of the most-likely path.
@@ -189,7 +181,7 @@ class SubgoalHMM:
         tuple of int
             Their places in `sequences`. They share no state with the other demonstrations.
         """
-        return tuple(np.flatnonzero(self.coverage() < LEAST_COVERAGE).tolist())
+        return tuple(np.flatnonzero(self.coverage() < alignment.LEAST_COVERAGE).tolist())
 
     def segments(self):
         """Which segments of which demonstrations run along each edge (Sec. V).
@@ -232,7 +224,7 @@ class SubgoalHMM:
         """
         sequence = checked_sequence(sequence, "sequence")
         labels, chains = self._grown()
-        nodes, _ = align_chain(sequence - chains.centre, graph_of(labels, chains), labels, chains)
+        nodes, _ = alignment.align_chain(sequence - chains.centre, graph_of(labels, chains), labels, chains)
         return np.where(nodes < 0, -1, nodes - FIRST)
 
     def log_likelihood(self, sequence):

@@ -242,8 +242,7 @@ def write_log(path, log):
     step = fov / (count - 1) if count > 1 else np.pi
     uneven = np.abs(log.angles - log.angles[0] - step * np.arange(count)).max()
     if uneven > 1e-3 * step:
-        rule = "the beams of a CARMEN log must be evenly spaced"
-        raise ValueError(f"{rule}, these are up to {uneven:.3g} rad off")
+        raise ValueError(f"the beams of a CARMEN log must be evenly spaced, these are up to {uneven:.3g} rad off")
     laser = " ".join(repr(float(value)) for value in (log.angles[0], fov, step, log.max_range))
     head = f"ROBOTLASER1 {UNKNOWN_TYPE} {laser} 0.001 0 {count}"
     with whole_file(path) as stream, _packed(stream, path) as text:

@@ -60,8 +60,7 @@ def read_map(path):
     occupancy = np.frombuffer(body, "<f4", offset=12).reshape(width, height).T.astype(float)
     wrong = ~((occupancy == -1) | ((occupancy >= 0) & (occupancy <= 1)))
     if wrong.any():
-        rule = "an occupancy must be in [0, 1], or -1 where unknown"
-        raise FormatError(f"{rule}, got {occupancy[wrong][0]}", path)
+        raise FormatError(f"an occupancy must be in [0, 1], or -1 where unknown, got {occupancy[wrong][0]}", path)
     occupancy[occupancy == -1] = np.nan
     return occupancy, _map_origin(path, head[0], resolution), resolution
 
@@ -71,8 +70,7 @@ def _gridmap_chunk(path, content, place):
     while place + 5 <= len(content):
         kind, size = struct.unpack_from("<Bi", content, place)
         if size < 0 or place + 5 + size > len(content):
-            chunk = f"a chunk of {size} bytes at byte {place}"
-            raise FormatError(f"{chunk} runs past the end of the file", path)
+            raise FormatError(f"a chunk of {size} bytes at byte {place} runs past the end of the file", path)
         chunk = content[place + 15 : place + 5 + size]
         if kind & ~NAMED_CHUNK == GRIDMAP_CHUNK:
             return chunk.partition(b"\0")[2] if kind & NAMED_CHUNK else chunk

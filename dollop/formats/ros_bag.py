@@ -63,8 +63,7 @@ def read_log(path, topic=None):
     except FormatError:
         raise
     except Exception as error:  # whatever rosbags' parsers happen to raise
-        reason = error or type(error).__name__
-        raise FormatError(f"not a readable ROS bag ({reason})", path) from None
+        raise FormatError(f"not a readable ROS bag ({error or type(error).__name__})", path) from None
     if moving:
         unread = f"{', '.join(sorted(moving))} of the bag is not read and every pose is (0, 0, 0)"
         remedy = "if the robot moved, set the poses with dataclasses.replace(log, poses=poses)"

@@ -87,8 +87,7 @@ def read_map(path):
     written = keys.get("origin")
     origin = [_number(path, "origin", v) for v in written] if isinstance(written, list) else []
     if len(origin) != 3 or not abs(origin[2]) <= RIGHT_ANGLED:
-        rule = "origin must be [x, y, 0] (a turned map is not supported)"
-        raise FormatError(f"{rule}, got {written!r}", path)
+        raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {written!r}", path)
     resolution = _number(path, "resolution", keys.get("resolution"))
     grey = _read_grey(path, str(keys.get("image")))[::-1]
     return _probabilities(path, keys, grey), origin[:2], resolution

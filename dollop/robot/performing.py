@@ -184,8 +184,7 @@ def perform(
     """
     check_choice("control", control, CONTROL_LAWS)
     if not (timeout > 0 and localise_within > 0):
-        given = f"{timeout} and {localise_within}"
-        raise ValueError(f"timeout and localise_within must be positive, got {given}")
+        raise ValueError(f"timeout and localise_within must be positive, got {timeout} and {localise_within}")
     kidnap = sorted((float(time), tuple(pose)) for time, pose in kidnap)
     places = named_places(task.law, robot, kidnap)
     obstacles = ObstacleMap.of(task.environment, background, [place[:2] for _, place in places])
