@@ -96,8 +96,7 @@ class Association:
             matched = indices >= 0
             before, now = self.environment.corners[matched], environment.corners[indices[matched]]
             differences = differences @ rotation(layout_turn(before, now)).T
-        moved = environment.corners[corners] + differences
-        return np.einsum("km,kmd->kd", weights / totals, moved)
+        return np.einsum("km,kmd->kd", weights / totals, environment.corners[corners] + differences)
 
     def carried(self, environment, matching=None):
         """The same ties with the objects where they stand now (Sec. IV-B).

@@ -3,11 +3,13 @@
 Plane geometry as in S. Thrun, W. Burgard, D. Fox, "Probabilistic Robotics" (2005), ch. 5.
 """
 
-from math import cos, pi, sin
+from math import cos, nextafter, pi, sin
 
 import numpy as np
 
 __all__ = ["motion_between", "moved_pose", "rotation", "wrapped"]
+
+_LEAST = nextafter(-pi, 0)  # the least angle above -pi
 
 
 def wrapped(angle):
@@ -28,7 +30,11 @@ def wrapped(angle):
     >>> wrapped(-np.pi) == np.pi, wrapped(np.array([0.1, 7.0])).round(3).tolist()
     (True, [0.1, 0.717])
     """
-    return angle + 2 * pi * ((pi - angle) // (2 * pi))
+    turned = angle + 2 * pi * ((pi - angle) // (2 * pi))
+    inside = (angle > -pi) & (angle <= pi)
+    if isinstance(angle, np.ndarray):
+        return np.where(inside, angle, turned.clip(_LEAST, pi))
+    return angle if inside else min(max(turned, _LEAST), pi)
 
 
 def rotation(angle):

@@ -201,8 +201,7 @@ def retime(points, n=60, decay=3.0):
     >>> retime([[0, 0], [8, 0]], 3, 3 * np.log(2))[:, 0]
     array([0., 4., 6., 8.])
     """
-    length = arc_length(points)[-1]
-    return at_arc_length(points, length * (1 - remaining_share(n, decay)))
+    return at_arc_length(points, arc_length(points)[-1] * (1 - remaining_share(n, decay)))
 
 
 def distance_to_polyline(points, polyline):

@@ -128,8 +128,7 @@ class Merging:
 
     def _emission_gain(self, rows):
         n, s, q = (each[rows, None] + each for each in (self.n, self.s, self.q))
-        together = emission_evidence(n, s, q, self.prior)
-        return together - self.own[rows, None] - self.own
+        return emission_evidence(n, s, q, self.prior) - self.own[rows, None] - self.own
 
     def _gain_of(self, rows, columns, block):
         """The gains of pairs of nodes, which stand in a block of each matrix."""
