@@ -112,9 +112,11 @@ def link_to_api(found):
 
     >>> CODE_LINK.sub(link_to_api, "[the lab](../dollop/lab/__init__.py)")
     '[the lab](../api/dollop.lab.rst)'
+    >>> CODE_LINK.sub(link_to_api, "[the notation](dollop/__init__.py)")
+    '[the notation](api/index.rst)'
     """
     module = found["path"].replace("/", ".").removesuffix(".__init__")
-    return f"]({found['up']}api/{module}.rst)"
+    return f"]({found['up']}api/{'index' if module == 'dollop' else module}.rst)"
 
 
 def write_api(folder):
