@@ -50,7 +50,7 @@ _PROBES = 50  # by so many objects at most it is judged how well an alignment fi
 
 @dataclass(frozen=True, eq=False)
 class Matching:
-    """Which corner of environment i is which corner of environment j, and how sure that is.
+    """Which corner of environment i is which of environment j, and how sure that is (Sec. IV-A).
 
     Attributes
     ----------

@@ -17,7 +17,7 @@ MAX_BYTES = 1 << 30
 
 
 class FormatError(ValueError):
-    """A file that cannot be read as what it claims to be.
+    """A file that cannot be read as what its name says, by the sources of CARMEN and ROS.
 
     Parameters
     ----------

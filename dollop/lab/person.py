@@ -43,7 +43,7 @@ LOBE_ANGLES = np.deg2rad([-110.0, -55.0, 0.0, 55.0, 110.0])
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """Where the person is at which time.
+    """Where the person is at which time; how they walk is our own model.
 
     Attributes
     ----------
@@ -212,7 +212,7 @@ def slalom(scene, seed, sides=None, approach=1.0, swing=0.75, **gait):
 
 
 def walk(points, scene, seed, speed=1.05, drift=0.04, sway=0.02, stand=1.5):
-    """A human-like walk through via-points, keeping clear of the scene's objects.
+    """A human-like walk through via-points, clear of the scene's objects; our own model.
 
     Parameters
     ----------

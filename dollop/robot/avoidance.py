@@ -44,7 +44,7 @@ AHEAD = 6
 
 @dataclass(frozen=True, eq=False)
 class ObstacleMap:
-    """Distances to what the robot must not touch, made for looking up one place at a time.
+    """Distances to what the robot must not touch, to look up one by one (beyond the paper).
 
     A place is anywhere in the plane; off the map, distances are those at its border.
 

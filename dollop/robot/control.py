@@ -55,7 +55,7 @@ SLOWEST = 1 / 16
 
 
 class Limits(namedtuple("Limits", "speed turn acceleration turn_acceleration")):
-    """What a robot can do.
+    """What a robot can do, as CARMEN and Stage have it in their parameters.
 
     Attributes
     ----------
