@@ -12,7 +12,7 @@ from dollop.formats.files import check_writable, whole_file
 from dollop.gridmap import check_is_map
 from dollop.trajectory import arc_length
 
-__all__ = ["main", "replication"]
+__all__ = ["STOPPED", "main", "replication"]
 
 LEG_HEIGHT = "at leg height a walker is two small blobs: try --min-area 0.0025 --stride 0.6"
 STOPPED = 130

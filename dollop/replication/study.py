@@ -365,6 +365,8 @@ def command(options):
     ------
     ValueError
         If a claim is unknown, there are too few seeds, or experiments failed.
+    KeyboardInterrupt
+        When interrupted, with the words where it goes on.
     ImportError
         If an extra is missing that the experiments need.
     OSError
@@ -388,7 +390,8 @@ def command(options):
     except RuntimeError as error:
         raise ValueError(f"{error}. Run the same command again to go on") from error
     except KeyboardInterrupt:
-        sys.exit(f"dollop: stopped; what was done is in {path}, the same command goes on there")
+        rest = f"what was done is in {path}, the same command goes on there"
+        raise KeyboardInterrupt(rest) from None
     publish(table, folder)
 
 

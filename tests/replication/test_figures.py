@@ -221,3 +221,17 @@ def test_fresh_demonstrations_are_merged_as_well_as_in_figure_x2():
         assert mean.right_order == pytest.approx(COMMITTED["x2"][f"mean_right_{n}"], abs=0.34)
     one = baseline.study(("slalom",), (2,), (0.15,), (0,), {"HMM, BIC": baseline.gaussian_hmm})
     assert COMMITTED["x2"]["hmm_right_2"] == pytest.approx(one.right_order.mean(), abs=0.67)
+
+
+def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):
+    """Ctrl-C while a panel is drawn: exit status 130, no traceback, and no half-written numbers."""
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(figures, "make", interrupted)
+    with pytest.raises(SystemExit) as end:
+        figures.main(["6b", "--folder", str(tmp_path)])
+    assert end.value.code == 130
+    assert "figures: stopped" in capsys.readouterr().err
+    assert not (tmp_path / "metrics.json").exists()

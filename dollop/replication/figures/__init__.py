@@ -14,6 +14,7 @@ import matplotlib.pyplot as plt
 from tqdm import tqdm
 
 from dollop import plot
+from dollop.cli import STOPPED
 from dollop.extras import need
 from dollop.formats.files import check_writable, whole_file
 from dollop.replication import gallery
@@ -69,7 +70,7 @@ def main(arguments=None):
     Raises
     ------
     SystemExit
-        An unknown id, or a folder that cannot be written to: told before the work.
+        An unknown id, or a folder that cannot be written to: told before the work. Interrupted.
     ImportError
         PyBullet is missing: told before the work as well.
     """
@@ -89,7 +90,12 @@ def main(arguments=None):
     except OSError as error:
         parser.error(f"the folder {folder} cannot be written to: {error}")
     made = tqdm(panels, desc="figures", unit="panel", file=sys.stderr)
-    write_numbers(folder, {id: make(id, folder) for id in made})
+    try:
+        write_numbers(folder, {id: make(id, folder) for id in made})
+    except KeyboardInterrupt:
+        made.close()
+        print(f"figures: stopped; {folder}/metrics.json is as it was", file=sys.stderr)
+        sys.exit(STOPPED)
     print(f"wrote {len(panels)} panels, metrics.json and the gallery README.md into {folder}/")
 
 
