@@ -26,7 +26,8 @@ III   A           matrix of one LDS, x_{n+1} = A x_n            `LDS.A`
 III   g           subgoal: where a segment ends                 `LDS.goal`
 III   G0, G1      statistics of a segment; they add up          `lds.Statistics`
 III               response of the control law from a start      `SequencedLDS.response`
-III   u           direction of the supervisory control law      `robot.control.Guidance`
+III               supervisory control law: segments hand over   `robot.control`
+III   u           its direction in the segment in force         `robot.control.Guidance`
 III   v, omega    speed and turning rate that it asks for       `robot.control.CONTROL_LAWS`
 III               performing a task; kidnapping the robot       `perform`
 IV    Omega^i     environment configuration i: 4N corners       `Environment.corners`
@@ -38,11 +39,13 @@ IV-A  alpha       scale of the cost before rounding up          `alpha` of it
 IV-A  g(.)        matching of two environments                  `Matching.indices`
 IV-B  m           closest corners that a subgoal is tied to     `m` of `associate`
 IV-B  w_l         weight of a corner: closer, heavier           `Association.weights`
+IV-B              subgoals updated as objects move              `Association.relocate`
+IV-B              the task where the objects stand now          `Task.adapt`
 V                 CDHMM: states that emit subgoals              `SubgoalHMM`
 V     n, s, q     statistics of a state; they add up            `cdhmm.evidence`
 V     a_{uv}      probability of a step between states          `SubgoalHMM.transitions`
 V                 most-likely path: the task's subgoals         `SubgoalHMM.most_likely_path`
-V                 task, learned and adapted                     `learn`
+V                 task, learned from demonstrations             `learn`
 ====  ==========  ============================================  ===============================
 
 SI units throughout; a pose is (x, y, theta); time comes first in every array.

@@ -73,8 +73,8 @@ def foreground_mask(points, background, background_radius=0.20):
     background : OccupancyGrid
         The background occupancy grid map.
     background_radius : float
-        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20
-        centimetres).
+        A reading is foreground if no background object lies within this radius, in m (Sec. II:
+        20 centimetres).
 
     Returns
     -------

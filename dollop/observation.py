@@ -53,8 +53,8 @@ def observe(
     background : OccupancyGrid
         The background occupancy grid map of the workspace; it must cover the scans.
     background_radius : float
-        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20
-        centimetres).
+        A reading is foreground if no background object lies within this radius, in m (Sec. II:
+        20 centimetres).
     gain, static_gain : float
         Autoregressive gain of the foreground grid that is tracked, per scan, and of the slow one
         that remembers static objects, per fifth scan: a walker wants no tail, a trash can wants
@@ -111,8 +111,8 @@ def foreground_hits(log, background, background_radius=0.20):
     background : OccupancyGrid
         The background occupancy grid map; it must cover the scans.
     background_radius : float
-        A reading is foreground if no background object lies within this radius, in m (Sec. II: 20
-        centimetres).
+        A reading is foreground if no background object lies within this radius, in m (Sec. II:
+        20 centimetres).
 
     Returns
     -------

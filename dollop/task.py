@@ -54,7 +54,7 @@ class Demonstration:
         check_trajectories(self.trajectory)
 
     def __repr__(self):
-        return f"Demonstration of {len(check_trajectories(self.trajectory))} walks; {self.environment}"
+        return f"Demonstration, walked {len(check_trajectories(self.trajectory))} x; {self.environment}"
 
     @classmethod
     def of(cls, observation, tolerance=0.02):
@@ -115,8 +115,8 @@ class Task:
     demonstrations: tuple = ()
 
     def __repr__(self):
-        learned = f"learned from {len(self.demonstrations)} demonstrations"
-        return f"Task of {len(self.law.segments)} subgoals, {learned}; {self.environment}"
+        shown, subgoals = len(self.demonstrations), len(self.law.segments)
+        return f"Task of {subgoals} subgoals, shown {shown} x; {self.environment}"
 
     @classmethod
     def of(cls, demonstration):

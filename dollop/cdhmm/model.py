@@ -75,8 +75,8 @@ class SubgoalHMM:
 
     def __repr__(self):
         path = " ".join(map(str, self.most_likely_path()))
-        text = f"SubgoalHMM of {len(self.means)} states from {len(self.sequences)} demonstrations"
-        return f"{text}, most-likely path {path}"
+        shown = f"{len(self.means)} states, shown {len(self.sequences)} x"
+        return f"SubgoalHMM of {shown}, most-likely path {path}"
 
     @classmethod
     def fit(cls, sequences, spread=0.15):

@@ -71,6 +71,9 @@ class Walk:
     headings: np.ndarray
     phases: np.ndarray
 
+    def __repr__(self):
+        return f"Walk of {arc_length(self.positions)[-1]:.1f} m in {self.t[-1]:.1f} s"
+
     @property
     def speeds(self):
         """(N,) speed in m/s."""

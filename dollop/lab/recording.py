@@ -37,6 +37,10 @@ class Recording:
     truth: pd.DataFrame
     scene: Scene
 
+    def __repr__(self):
+        walker = "with a walker" if len(self.truth) else "nobody walking"
+        return f"Recording, {walker}: {self.log}; {self.scene}"
+
     def save(self, path):
         """Write the log, and beside it the truth and the scene.
 

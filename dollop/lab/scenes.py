@@ -127,6 +127,13 @@ class Scene:
         object.__setattr__(self, "robot", tuple(float(value) for value in self.robot))
         check_objects(self.kinds, self.positions)
 
+    def __repr__(self):
+        objects = ", ".join(f"{kind} ({x:.2f}, {y:.2f})" for kind, (x, y) in self._placed())
+        return f"Scene of {objects or 'nothing'}"
+
+    def _placed(self):
+        return zip(self.kinds, self.positions, strict=True)
+
     @property
     def beam_radii(self):
         """(N,) radius of each object in m at the height of the laser."""

@@ -109,7 +109,8 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
     """
     table, failures, deaths = read_table(table_path), [], 0
     todo = missing(table, claims, ids, seeds)
-    bar = tqdm(total=len(todo), desc="study", unit="seed", file=sys.stderr)
+    look = {"desc": "study", "unit": "seed", "file": sys.stderr}
+    bar = tqdm(total=len(todo), disable=not todo, **look)
     with bar, workers(scheduler, jobs) as done:
         while todo:
             try:
@@ -390,8 +391,8 @@ def command(options):
     except RuntimeError as error:
         raise ValueError(f"{error}. Run the same command again to go on") from error
     except KeyboardInterrupt:
-        rest = f"what was done is in {path}, the same command goes on there"
-        raise KeyboardInterrupt(rest) from None
+        done = f"what was done is in {path}, the same command goes on there"
+        raise KeyboardInterrupt(done if path.exists() else "nothing was done yet") from None
     publish(table, folder)
 
 

@@ -158,7 +158,7 @@ def show_part(axes, heights):
 def figure_10b():
     """Performing the task of Figure 6b in modified environments: the robot's runs.
 
-    Purple lines are runs of the simulated robot; the fan is their starts, each a little off. Above
+    Pink lines are runs of the simulated robot; the fan is their starts, each a little off. Above
     the paper's kind of control, below Dollop's own, from the same starts: it follows the law more
     closely, and leaves it only where it is near a can. Clearance is from the robot's rim to the
     nearest obstacle.
