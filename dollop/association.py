@@ -334,5 +334,4 @@ def _variances(local):
     # A handful of demonstrations may agree by chance: one virtual one, of mean variance, keeps the
     # weights finite. Less variance than corners are known to tells nothing: it may be mere
     # rounding.
-    usual = squares.mean() / max(len(local) - 1, 1)
-    return squares + max(usual, _EPSILON)
+    return squares + max(squares.mean() / max(len(local) - 1, 1), _EPSILON)

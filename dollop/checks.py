@@ -59,7 +59,7 @@ def check_choice(name, value, known):
     Traceback (most recent call last):
     ValueError: control must be one of 'plain', 'pursuit', got 'plane'
     """
-    if value not in known:
+    if value not in list(known):
         raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}, got {value!r}")
 
 

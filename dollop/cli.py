@@ -22,8 +22,7 @@ STOPPED = 130
 def main(arguments=None):
     """Run one command; what is refused, or interrupted, ends with one line.
 
-    A bad file or value, or Ctrl-C, ends it with one line instead of a
-    traceback.
+    A bad file or value, and Ctrl-C, are told without a traceback.
 
     Parameters
     ----------
@@ -44,7 +43,7 @@ def main(arguments=None):
     options = root.parse_args(arguments)
     try:
         options.run(options)
-    except (ValueError, OSError, ImportError) as error:
+    except (ValueError, OSError, ImportError, OverflowError) as error:
         sys.exit(f"dollop: {error}")
     except KeyboardInterrupt as stop:
         print(f"\ndollop: stopped{f'; {stop}' if stop.args else ''}", file=sys.stderr)
@@ -184,3 +183,7 @@ def _data(options):
 def _study(options):
     """dollop study [CLAIM ...]"""
     replication("study").command(options)
+
+
+if __name__ == "__main__":
+    main()

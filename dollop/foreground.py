@@ -293,8 +293,7 @@ class ForegroundGrid:
         Blobs
         """
         occupied = self._active[self.value[self._active] > threshold]
-        cells = np.column_stack(np.divmod(occupied, self.shape[1]))
-        return find_blobs(cells, self.resolution, min_area)
+        return find_blobs(np.column_stack(np.divmod(occupied, self.shape[1])), self.resolution, min_area)
 
     def objects(self, threshold=0.5, min_area=0.01, stride=0.0):
         """Centroids of the foreground objects that the last scan met (Sec. II).

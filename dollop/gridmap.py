@@ -132,8 +132,7 @@ class OccupancyGrid:
         passes = sum(_counts(points, *frame) for points in passed)
         hits = _counts(ends[is_hit], *frame)
         seen = hits + passes
-        occupancy = np.divide(hits, seen, out=np.full(seen.shape, np.nan), where=seen > 0)
-        return cls(occupancy, *frame[:2])
+        return cls(np.divide(hits, seen, out=np.full(seen.shape, np.nan), where=seen > 0), *frame[:2])
 
     @classmethod
     def load(cls, path):
@@ -318,10 +317,10 @@ def _frame(points, resolution):
     """Corner, resolution and shape of a grid that holds the points (M, 2), with a cell to spare."""
     left, low = np.floor(points.min(axis=0) / resolution) - 1
     right, high = np.floor(points.max(axis=0) / resolution) + 2
-    columns, rows = int(right - left), int(high - low)
-    if columns * rows > MAX_CELLS:
+    columns, rows = right - left, high - low
+    if not columns * rows <= MAX_CELLS:
         raise ValueError(f"{columns} x {rows} cells of {resolution} m are more than {MAX_CELLS}")
-    return (left * resolution, low * resolution), resolution, (rows, columns)
+    return (left * resolution, low * resolution), resolution, (int(rows), int(columns))
 
 
 def _counts(points, origin, resolution, shape):

@@ -161,7 +161,7 @@ def match_confidently(environment_i, environment_j, names):
     Parameters
     ----------
     environment_i, environment_j : Environment
-        At least two objects each, or one each.
+        At least two objects each, or one each, or the same ones.
     names : (str, str)
         What to call the two in the error.
 

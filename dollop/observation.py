@@ -167,8 +167,7 @@ def static_boxes(grid, sensor, user=None, min_area=0.01, recent=1.0):
         return boxes
     last = user.positions[user.t > user.t[-1] - recent, None]
     low, high = boxes[:, :2] - grid.resolution, boxes[:, 2:] + grid.resolution
-    inside = (low <= last) & (last <= high)
-    return boxes[~inside.all(axis=2).any(axis=0)]
+    return boxes[~((low <= last) & (last <= high)).all(axis=2).any(axis=0)]
 
 
 def completed(box, seen, sensor, resolution):

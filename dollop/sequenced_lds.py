@@ -242,7 +242,8 @@ def chord_angles(start, subgoals):
 
 def check_search(tolerance, n_segments, sample_period, candidates):
     """Raise ValueError for a parameter of `SequencedLDS.fit` that is out of its range."""
-    check_positive("tolerance", tolerance)
+    if not tolerance > 0:
+        raise ValueError(f"tolerance must be positive, got {tolerance}")
     check_positive("sample_period", sample_period)
     if not 3 <= candidates <= MOST_CANDIDATES:
         raise ValueError(f"candidates must be 3 to {MOST_CANDIDATES}, got {candidates}")

@@ -80,8 +80,7 @@ class Demonstration:
         if observation.user is None:
             raise ValueError("a demonstration needs a user, but nobody moved")
         t, positions = observation.user.t, observation.user.positions
-        sample_period = float(np.median(np.diff(t)))
-        return cls(laps(t, positions), observation.environment, sample_period, tolerance)
+        return cls(laps(t, positions), observation.environment, float(np.median(np.diff(t))), tolerance)
 
     @cached_property
     def law(self):
@@ -250,7 +249,7 @@ class Task:
             raise FormatError(f"version must be {VERSION}, got {content.get('version')!r}", path)
         try:
             return from_dict(content)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
             raise FormatError(f"a damaged task: {type(error).__name__} {error}", path) from error
 
 

@@ -65,8 +65,11 @@ def check_trajectories(trajectories):
 
     Examples
     --------
-    >>> len(check_trajectories([[0, 0], [1, 0], [2, 0]]))
-    1
+    One walk alone is a list of one.
+
+    >>> walk = [[0, 0], [1, 0], [2, 0]]
+    >>> len(check_trajectories(walk)), len(check_trajectories([walk, walk]))
+    (1, 2)
     """
     if len(trajectories) == 0:
         raise ValueError("trajectories must hold at least one trajectory, got none")

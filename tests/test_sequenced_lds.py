@@ -178,8 +178,8 @@ def test_handwritten_letters_are_drawn(letter):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"tolerance": 0}, "tolerance must be positive and finite, got 0"),
-        ({"tolerance": np.nan}, "tolerance must be positive and finite, got nan"),
+        ({"tolerance": 0}, "tolerance must be positive, got 0"),
+        ({"tolerance": np.nan}, "tolerance must be positive, got nan"),
         ({"n_segments": 0}, "n_segments must be a whole number from 1 to 49.*got 0"),
         ({"n_segments": 50}, "n_segments must be a whole number from 1 to 49.*got 50"),
         ({"n_segments": 2.5}, "n_segments must be a whole number"),
@@ -188,7 +188,6 @@ def test_handwritten_letters_are_drawn(letter):
         ({"sample_period": -0.1}, "sample_period must be positive and finite, got -0.1"),
         ({"candidates": 2}, "candidates must be 3 to 1000, got 2"),
         ({"tolerance": 1e-6}, r"tolerance 1e-06 m cannot be kept with 100 candidate cuts, 0\.\d+ "),
-        ({"tolerance": np.inf}, "tolerance must be positive and finite, got inf"),
     ],
 )
 def test_bad_parameters(one_lap, options, says):

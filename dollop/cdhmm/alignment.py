@@ -43,8 +43,7 @@ def _edge_gains(counts):
     """What one more step adds to the evidence: along each edge (S, S), and along a new one (S,)."""
     out, total = np.maximum((counts > 0).sum(1), 1), counts.sum(1)
     new = np.where(total > 0, np.log(out) - np.log(out + total) - np.log(out + total + 1), 0.0)
-    again = np.log(counts + 1) - np.log(out + total)[:, None]
-    return np.where(counts > 0, again, new[:, None]), new
+    return np.where(counts > 0, np.log(counts + 1) - np.log(out + total)[:, None], new[:, None]), new
 
 
 def align_chain(points, graph, labels, chains):

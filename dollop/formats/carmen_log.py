@@ -50,6 +50,9 @@ class Odometry:
     def __len__(self):
         return len(self.t)
 
+    def __repr__(self):
+        return f"Odometry of {len(self)} messages in {np.ptp(self.t):.1f} s"
+
 
 def read_log(path, max_range=None):
     """Laser scans of a CARMEN log, plain or gzipped.

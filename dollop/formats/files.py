@@ -30,8 +30,11 @@ class FormatError(ValueError):
     """
 
     def __init__(self, message, path, line=None):
-        place = path if line is None else f"{path}, line {line}"
-        super().__init__(f"{place}: {message}")
+        super().__init__(message, str(path), line)  # all of them, or it could not be pickled
+
+    def __str__(self):
+        message, path, line = self.args
+        return f"{path}: {message}" if line is None else f"{path}, line {line}: {message}"
 
 
 def from_file(path, make, *content):
@@ -79,7 +82,7 @@ def warn_of(path, text):
         What is wrong with it.
     """
     frame, depth = sys._getframe(), 1
-    while frame.f_back and frame.f_globals["__name__"].startswith("dollop."):
+    while frame.f_back and frame.f_globals.get("__name__", "").startswith("dollop."):
         frame, depth = frame.f_back, depth + 1
     warnings.warn(f"{path}: {text}", stacklevel=depth)
 

@@ -89,7 +89,7 @@ def read_map(path):
     if len(origin) != 3 or not abs(origin[2]) <= RIGHT_ANGLED:
         raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {written!r}", path)
     resolution = _number(path, "resolution", keys.get("resolution"))
-    grey = _read_grey(path, str(keys.get("image")))[::-1]
+    grey = _read_grey(path, str(keys.get("image", "")))[::-1]
     return _probabilities(path, keys, grey), origin[:2], resolution
 
 

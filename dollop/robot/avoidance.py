@@ -79,6 +79,10 @@ class ObstacleMap:
         """The distances as one list, which answers single questions faster than an array."""
         return self.distances.ravel().tolist()
 
+    def __repr__(self):
+        rows, columns = self.distances.shape
+        return f"ObstacleMap of {columns} x {rows} cells for a robot of {self.radius:g} m"
+
     @classmethod
     def of(cls, environment, background=None, places=(), radius=ROBOT_RADIUS, resolution=0.05):
         """The obstacles of an environment before a background (reconstruction).

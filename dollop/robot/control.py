@@ -147,8 +147,7 @@ class Guidance:
         """
         (gx, gy), (a, b, c, d) = self.goals[k], self._steps[k]
         offset_x, offset_y = x - gx, y - gy
-        wish = towards(a * offset_x + b * offset_y, c * offset_x + d * offset_y)
-        return self._led(k, x, y, *wish)
+        return self._led(k, x, y, *towards(a * offset_x + b * offset_y, c * offset_x + d * offset_y))
 
     def _led(self, k, x, y, ux, uy):
         """The direction (ux, uy) of segment k at x, y in m, led round obstacles or by a detour."""

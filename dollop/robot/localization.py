@@ -202,8 +202,7 @@ class MonteCarloLocalizer:
         """Particles (N, 3) drawn with the weights by one comb, few if they agree."""
         count = TRACKING if self.spread.max() < NARROW else SEARCHING
         comb = (np.arange(count) + self._rng.random()) / count
-        chosen = np.searchsorted(np.cumsum(weights), comb).clip(max=len(weights) - 1)
-        return self.particles[chosen]
+        return self.particles[np.searchsorted(np.cumsum(weights), comb).clip(max=len(weights) - 1)]
 
 
 class LikelihoodField:
@@ -258,8 +257,7 @@ class LikelihoodField:
 
     def within_reach(self, ends):
         """Beam ends (M, 2), those that are farther than the map is wide drawn in."""
-        lengths = np.hypot(*ends.T)
-        return ends * np.minimum(1.0, self.reach / np.maximum(lengths, 1e-9))[:, None]
+        return ends * np.minimum(1.0, self.reach / np.maximum(np.hypot(*ends.T), 1e-9))[:, None]
 
 
 def lattice(free, background):

@@ -3,6 +3,8 @@
 import codecs
 import errno
 import gzip
+import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -130,3 +132,10 @@ def test_a_warning_points_at_who_asked_for_the_file():
     with pytest.warns(UserWarning, match=r"^a\.txt: odd$") as record:
         warn_of("a.txt", "odd")
     assert record[0].filename == __file__
+
+
+def test_an_error_survives_the_way_between_processes():
+    """Pickled and unpickled, as by a worker, it says the same."""
+    for error in (FormatError("too short", "a.log"), FormatError("too short", Path("a.log"), 3)):
+        assert str(pickle.loads(pickle.dumps(error))) == str(error)
+    assert str(error) == "a.log, line 3: too short"

@@ -235,3 +235,11 @@ def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):
     assert end.value.code == 130
     assert "figures: stopped" in capsys.readouterr().err
     assert not (tmp_path / "metrics.json").exists()
+
+
+def test_numbers_that_are_none_are_refused_before_the_work(tmp_path, monkeypatch):
+    """A metrics.json that is not JSON ends the call before a panel is drawn."""
+    monkeypatch.setattr(figures, "make", None)
+    (tmp_path / "metrics.json").write_text("x")
+    with pytest.raises(SystemExit, match="metrics.json is not JSON"):
+        figures.main(["6b", "--folder", str(tmp_path)])

@@ -89,9 +89,10 @@ def main(arguments=None):
         check_writable(folder / "metrics.json")
     except OSError as error:
         parser.error(f"the folder {folder} cannot be written to: {error}")
+    standing = numbers_in(folder)
     made = tqdm(panels, desc="figures", unit="panel", file=sys.stderr)
     try:
-        write_numbers(folder, {id: make(id, folder) for id in made})
+        write_numbers(folder, standing | {id: make(id, folder) for id in made})
     except KeyboardInterrupt:
         made.close()
         print(f"figures: stopped; {folder}/metrics.json is as it was", file=sys.stderr)
@@ -99,12 +100,19 @@ def main(arguments=None):
     print(f"wrote {len(panels)} panels, metrics.json and the gallery README.md into {folder}/")
 
 
-def write_numbers(folder, fresh):
-    """Write metrics.json, with fresh numbers beside those that stand in it, and the gallery."""
+def numbers_in(folder):
+    """What metrics.json holds so far, by panel; read before the work, lest it be done in vain."""
     written = folder / "metrics.json"
-    numbers = (json.loads(written.read_text()) if written.exists() else {}) | fresh
+    try:
+        return json.loads(written.read_text()) if written.exists() else {}
+    except ValueError as error:
+        sys.exit(f"figures: {written} is not JSON ({error}); remove it, and run again")
+
+
+def write_numbers(folder, numbers):
+    """Write metrics.json and the gallery, panels in the paper's order."""
     numbers = {id: numbers[id] for id in FIGURES if id in numbers}
-    with whole_file(written, "w") as stream:
+    with whole_file(folder / "metrics.json", "w") as stream:
         stream.write(json.dumps(numbers, indent=1) + "\n")
     with whole_file(folder / "README.md", "w") as stream:
         stream.write(gallery.page(FIGURES.values(), numbers))
