@@ -12,7 +12,7 @@ from dollop.formats.files import check_writable, whole_file
 from dollop.gridmap import check_is_map
 from dollop.trajectory import arc_length
 
-__all__ = ["STOPPED", "main", "replication"]
+__all__ = ["in_one_line", "main", "replication"]
 
 LEG_HEIGHT = "at leg height a walker is two small blobs: try --min-area 0.0025 --stride 0.6"
 STOPPED = 130
@@ -41,12 +41,31 @@ def main(arguments=None):
         print(f"dollop: no command {arguments[0]!r}; known: {', '.join(commands)}", file=sys.stderr)
         sys.exit(2)
     options = root.parse_args(arguments)
+    in_one_line("dollop", options.run, options)
+
+
+def in_one_line(program, work, *arguments):
+    """Do the work of a command; what is refused, or interrupted, ends it with one line.
+
+    Parameters
+    ----------
+    program : str
+        Who says it.
+    work : callable
+    *arguments : object
+        What the work takes.
+
+    Raises
+    ------
+    SystemExit
+        With 1 and the message for what is refused, 130 when interrupted.
+    """
     try:
-        options.run(options)
+        work(*arguments)
     except (ValueError, OSError, ImportError, OverflowError) as error:
-        sys.exit(f"dollop: {error}")
+        sys.exit(f"{program}: {error}")
     except KeyboardInterrupt as stop:
-        print(f"\ndollop: stopped{f'; {stop}' if stop.args else ''}", file=sys.stderr)
+        print(f"\n{program}: stopped{f'; {stop}' if stop.args else ''}", file=sys.stderr)
         sys.exit(STOPPED)
 
 

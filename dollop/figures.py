@@ -1,8 +1,6 @@
 """Every numbered figure of the paper, regenerated: python -m dollop.figures [id ...]."""
 
-import sys
-
-from dollop.cli import replication
+from dollop.cli import in_one_line, replication
 
 __all__ = ["main"]
 
@@ -20,10 +18,7 @@ def main(arguments=None):
     SystemExit
         With a message for what is refused.
     """
-    try:
-        replication("figures").main(arguments)
-    except ImportError as error:
-        sys.exit(f"figures: {error}")
+    in_one_line("figures", lambda: replication("figures").main(arguments))
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import pytest
 from places import ROOT
 
 import dollop
+from dollop import figures as door
 from dollop.replication import baseline, figures, recordings
 from dollop.replication.figures.controls import CONTROLS, numbers
 from dollop.replication.figures.performing import law_numbers
@@ -231,7 +232,7 @@ def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr(figures, "make", interrupted)
     with pytest.raises(SystemExit) as end:
-        figures.main(["6b", "--folder", str(tmp_path)])
+        door.main(["6b", "--folder", str(tmp_path)])
     assert end.value.code == 130
     assert "figures: stopped" in capsys.readouterr().err
     assert not (tmp_path / "metrics.json").exists()
@@ -241,5 +242,5 @@ def test_numbers_that_are_none_are_refused_before_the_work(tmp_path, monkeypatch
     """A metrics.json that is not JSON ends the call before a panel is drawn."""
     monkeypatch.setattr(figures, "make", None)
     (tmp_path / "metrics.json").write_text("x")
-    with pytest.raises(SystemExit, match="metrics.json is not JSON"):
-        figures.main(["6b", "--folder", str(tmp_path)])
+    with pytest.raises(SystemExit, match="metrics.json: not JSON"):
+        door.main(["6b", "--folder", str(tmp_path)])

@@ -14,9 +14,8 @@ import matplotlib.pyplot as plt
 from tqdm import tqdm
 
 from dollop import plot
-from dollop.cli import STOPPED
 from dollop.extras import need
-from dollop.formats.files import check_writable, whole_file
+from dollop.formats.files import FormatError, check_writable, whole_file
 from dollop.replication import gallery
 from dollop.replication.figures import environment, learning, observing, performing  # noqa: F401
 from dollop.replication.figures.panel import PANELS
@@ -70,7 +69,11 @@ def main(arguments=None):
     Raises
     ------
     SystemExit
-        An unknown id, or a folder that cannot be written to: told before the work. Interrupted.
+        An unknown id, or a folder that cannot be written to: told before the work.
+    FormatError
+        A metrics.json that is not JSON: told before the work.
+    KeyboardInterrupt
+        When interrupted, with what became of the numbers.
     ImportError
         PyBullet is missing: told before the work as well.
     """
@@ -95,8 +98,7 @@ def main(arguments=None):
         write_numbers(folder, standing | {id: make(id, folder) for id in made})
     except KeyboardInterrupt:
         made.close()
-        print(f"figures: stopped; {folder}/metrics.json is as it was", file=sys.stderr)
-        sys.exit(STOPPED)
+        raise KeyboardInterrupt(f"{folder}/metrics.json is as it was") from None
     print(f"wrote {len(panels)} panels, metrics.json and the gallery README.md into {folder}/")
 
 
@@ -106,7 +108,7 @@ def numbers_in(folder):
     try:
         return json.loads(written.read_text()) if written.exists() else {}
     except ValueError as error:
-        sys.exit(f"figures: {written} is not JSON ({error}); remove it, and run again")
+        raise FormatError(f"not JSON ({error}); remove it, and run again", written) from None
 
 
 def write_numbers(folder, numbers):
