@@ -19,14 +19,14 @@ figures: .venv/ready  ## simulate, observe, learn, perform and draw every figure
 	$(RUN) -m dollop.figures
 
 test: .venv/ready  ## unit tests, doctests, notebooks
-	$(RUN) -m pytest -n 2 -q
+	$(RUN) -m pytest -q
 	env -u MPLBACKEND $(RUN) -m pytest --nbmake --nbmake-timeout=120 -n 2 -q -o addopts="" notebooks
 
 fast: .venv/ready  ## the tests of the library alone, without the replication
-	$(RUN) -m pytest -n 2 -q -m "not replication"
+	$(RUN) -m pytest -q -m "not replication"
 
 coverage: .venv/ready  ## which lines of the library its tests run
-	$(RUN) -m pytest -n 2 -q -m "not replication" --cov=dollop --cov-report=term
+	$(RUN) -m pytest -q -m "not replication" --cov=dollop --cov-report=term
 
 check: .venv/ready  ## lint and formatting
 	$(RUN) -m ruff check .

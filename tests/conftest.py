@@ -1,5 +1,7 @@
 """What all tests share: the same examples on every machine, however slow, and names without file content."""
 
+from pathlib import Path
+
 import pytest
 from hypothesis import settings
 from places import ROOT
@@ -15,6 +17,12 @@ settings.load_profile("repeatable")
 def pytest_make_parametrize_id(val, argname):
     """Name bytes after their argument: file content holds what changes, such as the time in a gzip's header."""
     return argname if isinstance(val, bytes) else None
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config):
+    """One process for single files, as more of them take longer to start than they save; else all cores."""
+    return 0 if all(Path(each.split("::")[0]).is_file() for each in config.args) else None
 
 
 def pytest_collection_modifyitems(items):

@@ -40,9 +40,8 @@ def windings(path, boxes):
 
 @settings(max_examples=25)
 @given(st.floats(-3, 3), st.floats(-3, 3))
-def test_objects_that_move_together_take_the_task_along(dx, dy):
+def test_objects_that_move_together_take_the_task_along(task, dx, dy):
     """All boxes shifted by the same: start, subgoals and response are shifted by it (Sec. IV-B)."""
-    task = Task.of(Demonstration(eight(), Environment(CANS)))
     adapted = task.adapt(Environment(CANS + [dx, dy, dx, dy]))
     np.testing.assert_allclose(adapted.law.response(), task.law.response() + [dx, dy], atol=1e-9)
 
