@@ -17,6 +17,7 @@ import pandas as pd
 from tqdm import tqdm
 
 from dollop.cdhmm import SubgoalHMM
+from dollop.extras import need
 from dollop.lab.drawn import TASKS, draw_demonstrations
 
 __all__ = [
@@ -95,7 +96,13 @@ def gaussian_hmm(sequences, left_to_right=False, n_states=range(2, 11), restarts
     -------
     (L, 2) float array
         In m.
+
+    Raises
+    ------
+    ImportError
+        If hmmlearn is not installed.
     """
+    need("baseline")
     from threadpoolctl import threadpool_limits
 
     points, lengths = np.concatenate(sequences), [len(sequence) for sequence in sequences]

@@ -75,7 +75,7 @@ def main(arguments=None):
     KeyboardInterrupt
         When interrupted, with what became of the numbers.
     ImportError
-        PyBullet is missing: told before the work as well.
+        What a panel needs is missing: told before the work as well.
     """
     parser = argparse.ArgumentParser(prog="python -m dollop.figures", description=DESCRIPTION)
     known = ", ".join(FIGURES)
@@ -86,7 +86,8 @@ def main(arguments=None):
     unknown = [id for id in panels if id not in FIGURES]
     if unknown:
         parser.error(f"no figure {', '.join(unknown)}; known: {known}")
-    need("lab")
+    for id in panels:
+        need(FIGURES[id].extra)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         check_writable(folder / "metrics.json")

@@ -24,7 +24,7 @@ LINES = {  # method: name in metrics.json, marker, seeds, numbers of demonstrati
 }
 
 
-@panel("x2", **{name: method for method, (name, *_) in LINES.items()})
+@panel("x2", extra="baseline", **{name: method for method, (name, *_) in LINES.items()})
 def figure_x2():
     """Beyond the paper: learning a task from more and more demonstrations.
 

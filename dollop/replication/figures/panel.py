@@ -27,6 +27,8 @@ class Panel:
         What it shows, after the paper's caption: the first paragraph of the drawing's docstring.
     look : str
         What to look at, and what to make of it: the rest of the docstring.
+    extra : str
+        What must be installed to draw it: a key of `dollop.extras.EXTRAS`.
     """
 
     id: str
@@ -34,6 +36,7 @@ class Panel:
     columns: dict
     caption: str
     look: str
+    extra: str
 
     @property
     def picture(self):
@@ -42,13 +45,15 @@ class Panel:
         return f"fig_{number.zfill(2)}{self.id[len(number) :]}.png"
 
 
-def panel(id, **columns):
+def panel(id, extra="lab", **columns):
     """Register the drawing that follows as a panel.
 
     Parameters
     ----------
     id : str
         The paper's name for it.
+    extra : str
+        What must be installed to draw it.
     **columns : str
         What its numbers are of, where they are of several things.
 
@@ -60,7 +65,8 @@ def panel(id, **columns):
 
     def register(draw):
         caption, look = inspect.getdoc(draw).split("\n\n", 1)
-        PANELS[id] = Panel(id, draw, columns, " ".join(caption.split()), " ".join(look.split()))
+        caption, look = (" ".join(each.split()) for each in (caption, look))
+        PANELS[id] = Panel(id, draw, columns, caption, look, extra)
         return draw
 
     return register
