@@ -13,7 +13,7 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import ListedColormap
-from matplotlib.patches import Circle, Ellipse, Rectangle
+from matplotlib.patches import Circle, Ellipse, Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 
 from dollop.foreground import endpoints
@@ -190,6 +190,43 @@ def robot(ax, pose, radius=_RIM, label=None):
     ax.plot([], [], "o", color=_ROBOT, markeredgecolor="black", markersize=10, label=label)
     ahead = [x, x + radius * np.cos(theta)], [y, y + radius * np.sin(theta)]
     ax.plot(*ahead, color="black", zorder=5)
+
+
+def scene(ax, scene, walks=()):
+    """What stands in a scene of the laboratory, who walks where, and the robot that watches.
+
+    Furniture that the laser does not meet, above or below it, is pale.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    scene : dollop.lab.Scene
+    walks : sequence of dollop.lab.Walk
+        Of its people, as `dollop.lab.walks_of` has them; the first is the user's.
+    """
+    height = scene.robot.beam_height
+    ax.add_patch(Polygon(scene.room.corners, fill=False, edgecolor=BACKGROUND, linewidth=2))
+    for part in scene.room.furniture:
+        shade = 1.0 if part.reaches(height) else 0.25
+        ax.add_patch(Polygon(part.outline.border, facecolor=BACKGROUND, alpha=shade))
+    label = "objects"
+    for each in scene.objects:
+        ax.add_patch(Polygon(each.footprint.border, fill=False, edgecolor=OBSTACLE, linewidth=1, linestyle=":"))
+        met = each.outline(height)
+        if met is not None:
+            ax.add_patch(Polygon(met.border, fill=False, edgecolor=OBSTACLE, linewidth=2, label=label))
+            label = None
+    for move in scene.moves:
+        arrow = {"color": OBSTACLE, "arrowstyle": "->"}
+        ax.annotate("", move.to, scene.objects[move.object].position, arrowprops=arrow)
+    for k, each in enumerate(walks):
+        colour, name = (TRUTH, "user, in truth") if k == 0 else (BACKGROUND, "somebody else" if k == 1 else None)
+        path(ax, each.positions, name, colour)
+        ax.plot(*each.positions[0], "o", color=colour, markersize=4)
+    robot(ax, scene.robot.pose, scene.robot.radius, "robot")
+    if scene.robot.way:
+        path(ax, [scene.robot.pose[:2], *scene.robot.way], None, "black", linestyle="--")
+    ax.autoscale_view()
 
 
 def scan(ax, log, i, label="laser scan"):

@@ -15,17 +15,23 @@ from dollop.extras import need
 
 HOMES = {
     "drawn": ["TASKS", "draw_demonstrations", "random_layouts"],
+    "engine": ["Engine"],
+    "people": ["find_way", "read_walks", "walk_of", "walks_of"],
     "person": ["Walk", "figure_eight", "slalom", "walk"],
-    "pioneer": ["Pioneer", "laser_pose"],
+    "pioneer": ["Pioneer"],
     "recording": ["Recording"],
     "render": ["render_lab", "render_robot"],
-    "scenes": ["Scene", "empty_scene", "figure_eight_scene", "moved", "rearranged", "slalom_scene"],
-    "sick": ["SickLMS200"],
-    "simulate": ["record", "record_background", "record_figure_eights", "watch"],
+    "rooms": ["LABORATORY", "Part", "Room"],
+    "scanner": ["Scanner", "SickLMS200", "SickTiM571", "UTM30LX"],
+    "scenes": [
+        "Move", "Object", "Person", "Robot", "Scene", "empty_scene", "figure_eight_scene", "moved", "rearranged",
+        "slalom_scene",
+    ],
+    "simulate": ["record", "record_background", "record_figure_eights", "record_tour", "watch"],
     "world": ["World"],
-}
+}  # fmt: skip
 MODULES = {name: module for module, names in HOMES.items() for name in names}
-NEED_PYBULLET = {"pioneer", "render", "simulate", "world"}
+NEED_PYBULLET = {"engine", "pioneer", "render", "simulate", "world"}
 
 __all__ = sorted(MODULES)
 

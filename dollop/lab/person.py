@@ -11,18 +11,21 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
-from dollop.lab.scenes import background_distance
+from dollop.lab.outlines import nearest_core, outline_distances
 from dollop.trajectory import arc_length, resample
 
 __all__ = [
     "DEPTH",
+    "LEG_RADIUS",
     "SHOULDERS",
-    "STRIDE_RATE",
+    "TIME_STEP",
     "Walk",
+    "body_offsets",
     "figure_eight",
     "slalom",
     "smooth_path",
     "walk",
+    "walk_along",
 ]
 
 SHOULDERS = 0.45
@@ -31,10 +34,10 @@ DEPTH = 0.25
 """Depth of the body from chest to back in m."""
 CLEARANCE = 0.10
 """Least distance in m that a person keeps between shoulder and foreground object."""
-BACKGROUND_CLEARANCE = 0.30
-"""Least distance in m, shoulder to background: the radius of Sec. II swallows what is nearer."""
 STRIDE_RATE = 0.9
 """Strides (two steps) per second."""
+LEG_RADIUS = 0.055
+LEG_SPREAD = 0.09
 
 TIME_STEP = 0.02
 PATH_STEP = 0.02
@@ -55,6 +58,8 @@ class Walk:
         Direction the chest points in, in rad, unwrapped.
     phases : (N,) float array
         Phase of the gait in rad: one stride is 2 pi, and the phase stands while the person stands.
+    body : str
+        What the laser meets: a "torso", or two "legs" that stride.
 
     Examples
     --------
@@ -70,6 +75,7 @@ class Walk:
     positions: np.ndarray
     headings: np.ndarray
     phases: np.ndarray
+    body: str = "torso"
 
     def __repr__(self):
         return f"Walk of {arc_length(self.positions)[-1]:.1f} m in {self.t[-1]:.1f} s"
@@ -135,8 +141,8 @@ def figure_eight(scene, seed, laps=5, first_turn="left", **gait):
     >>> ((bearings[:, -1] - bearings[:, 0]) / (2 * np.pi)).round().tolist()
     [-1.0, 1.0]
     """
-    if len(scene.kinds) < 2:
-        raise ValueError(f"a figure-eight needs two objects, the scene has {len(scene.kinds)}")
+    if len(scene.objects) < 2:
+        raise ValueError(f"a figure-eight needs two objects, the scene has {len(scene.objects)}")
     if first_turn not in ("left", "right"):
         raise ValueError(f"first_turn must be 'left' or 'right', got {first_turn!r}")
     rng = np.random.default_rng(seed)
@@ -214,7 +220,9 @@ def slalom(scene, seed, sides=None, approach=1.0, swing=0.75, **gait):
     return walk(points + rng.normal(0.0, 0.04, points.shape), scene, rng, **gait)
 
 
-def walk(points, scene, seed, speed=1.05, drift=0.04, sway=0.02, stand=1.5):
+def walk(
+    points, scene, seed, speed=1.05, drift=0.04, sway=0.02, stand=1.5, body="torso", stops=(), from_background=0.0
+):
     """A human-like walk through via-points, clear of the scene's objects; our own model.
 
     Parameters
@@ -231,6 +239,12 @@ def walk(points, scene, seed, speed=1.05, drift=0.04, sway=0.02, stand=1.5):
         Amplitude in m of the lateral sway with every stride.
     stand : float
         Time in s stood still before and after.
+    body : str
+        "torso" or "legs".
+    stops : sequence of (int, float)
+        At which via-points the person stops, for how many s.
+    from_background : float
+        Least distance in m between shoulder and background.
 
     Returns
     -------
@@ -239,7 +253,7 @@ def walk(points, scene, seed, speed=1.05, drift=0.04, sway=0.02, stand=1.5):
     Raises
     ------
     ValueError
-        If the walk comes nearer to the background than `BACKGROUND_CLEARANCE` beside the shoulder.
+        If the walk leads through an object, or comes nearer to the background than it may.
 
     Examples
     --------
@@ -253,17 +267,73 @@ def walk(points, scene, seed, speed=1.05, drift=0.04, sway=0.02, stand=1.5):
     True
     """
     rng = np.random.default_rng(seed)
-    path = smooth_path(np.asarray(points, dtype=float))
+    points = np.asarray(points, dtype=float)
+    path = smooth_path(points)
     path = path + left_of(tangents(path)) * wander(len(path), 1.5 / PATH_STEP, drift, rng)[:, None]
     path = evenly(keep_clear(path, scene))
-    distance = travelled(speed_profile(path, speed, rng), stand)
+    pauses = [(0.0, stand), *((passed(path, points, k), seconds) for k, seconds in stops)]
+    distance = travelled(speed_profile(path, speed, rng, pauses), pauses, stand)
     positions, headings = along_path(path, distance)
     phases = gait_phases(distance)
     fade = np.clip(np.gradient(distance, TIME_STEP) / speed, 0.0, 1.0)
     left = np.column_stack([-np.sin(headings), np.cos(headings)])
     positions = keep_clear(positions + (sway * fade * np.sin(phases))[:, None] * left, scene)
-    check_room(positions)
-    return Walk(np.arange(len(positions)) * TIME_STEP, positions, headings, phases)
+    check_room(positions, scene, from_background)
+    return Walk(np.arange(len(positions)) * TIME_STEP, positions, headings, phases, body)
+
+
+def walk_along(t, positions, body="torso"):
+    """A walk as it was recorded, replayed.
+
+    Parameters
+    ----------
+    t : (N,) float array
+        In s from 0, increasing.
+    positions : (N, 2) float array
+        In m.
+    body : str
+        "torso" or "legs".
+
+    Returns
+    -------
+    Walk
+    """
+    times = np.arange(0.0, t[-1] + TIME_STEP / 2, TIME_STEP)
+    way = np.column_stack([np.interp(times, t, axis) for axis in positions.T])
+    distance = arc_length(way)
+    headings = smooth_headings(way, 0.15 / TIME_STEP)
+    return Walk(times, way, headings, gait_phases(distance), body)
+
+
+def body_offsets(body, phase):
+    """Where torso or legs are, seen from the middle of the body.
+
+    The legs swing with an amplitude at which a foot would stand still on the floor in mid-stance at
+    1 m/s; a reconstruction.
+
+    Parameters
+    ----------
+    body : str
+        "torso" or "legs".
+    phase : float
+        Phase of the gait in rad.
+
+    Returns
+    -------
+    (1, 2) or (2, 2) float array
+        Ahead and to the left in m.
+
+    Examples
+    --------
+    The body stays in the middle of its legs.
+
+    >>> body_offsets("legs", phase=1.0).mean(axis=0).tolist()
+    [0.0, 0.0]
+    """
+    if body == "torso":
+        return np.zeros((1, 2))
+    stride = np.sin(phase) / (2 * np.pi * STRIDE_RATE)
+    return np.array([[stride, LEG_SPREAD], [-stride, -LEG_SPREAD]])
 
 
 def smooth_path(points):
@@ -303,7 +373,7 @@ def evenly(path, step=PATH_STEP):
 def tangents(path):
     """Unit vectors along a path at each of its points (N, 2)."""
     along = np.gradient(path, axis=0)
-    return along / np.linalg.norm(along, axis=1, keepdims=True)
+    return along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)  # who turns back stands
 
 
 def left_of(along):
@@ -325,39 +395,54 @@ def wander(n, correlation, spread, rng):
 
 
 def keep_clear(points, scene, softness=0.03):
-    """The points pushed out of the circles in which a shoulder would touch an object, smoothly."""
+    """The points pushed out of the reach in which a shoulder would touch an object, smoothly."""
     points = np.array(points)
-    for centre, radius in zip(scene.positions, scene.foot_radii, strict=True):
-        away = points - centre
+    for outline in (each.footprint for each in scene.objects):
+        away = points - nearest_core(points, outline)
         distance = np.linalg.norm(away, axis=1, keepdims=True)
-        lack = radius + SHOULDERS / 2 + CLEARANCE - distance
+        lack = outline.radius + SHOULDERS / 2 + CLEARANCE - distance
         points += away / np.maximum(distance, 1e-9) * softness * np.logaddexp(0.0, lack / softness)
     return points
 
 
-def speed_profile(path, speed, rng, bend=0.8, acceleration=0.7):
+def passed(path, points, k):
+    """How far along an evenly sampled path its k-th via-point is passed, in m."""
+    reached = arc_length(points)
+    share = np.arange(len(path)) / (len(path) - 1) - reached[k] / reached[-1]
+    off = np.linalg.norm(path - points[k], axis=1)
+    return float(np.argmin(off + len(path) * PATH_STEP * np.abs(share)) * PATH_STEP)
+
+
+def speed_profile(path, speed, rng, pauses, bend=0.8, acceleration=0.7):
     """Speed in m/s at every point of an evenly sampled path.
 
     Curves are walked slower by the two-thirds power law of human movement, v ~ curvature^(-1/3)
     (Lacquaniti et al., 1983), here speed * (1 + (curvature / bend)^2)^(-1/6) so that straight lines
     have a finite speed; fluctuations of 4 % that last metres are laid over it, and it starts and
-    ends at rest within the `acceleration` in m/s^2.
+    ends at rest, also at pauses (where in m, how long in s), within the `acceleration` in m/s^2.
     """
     step = arc_length(path)[1]
     curvature = np.gradient(smooth_headings(path, 0.2 / step)) / step
     wish = speed * (1.0 + (curvature / bend) ** 2) ** (-1 / 6)
     wish *= 1.0 + wander(len(path), 3.0 / step, 0.04, rng)
-    ends = np.minimum(np.arange(len(path)), np.arange(len(path))[::-1]) * step
+    steps = np.arange(len(path))
+    rests = np.array([len(path) - 1, *(round(place / PATH_STEP) for place, _ in pauses)])
+    ends = np.abs(steps - rests[:, None]).min(axis=0) * step
     possible = np.sqrt(2 * acceleration * (ends + step / 10))
     return np.minimum(gaussian_filter1d(wish, 0.3 / step), possible)
 
 
-def travelled(speeds, stand):
-    """Distance in m at every time step by the speeds of an even path, standing before and after."""
+def travelled(speeds, pauses, stand):
+    """Distance in m at every time step by the speeds of an even path, with pauses, standing after it."""
     speeds_between = (speeds[1:] + speeds[:-1]) / 2
-    times = np.concatenate([[0.0], np.cumsum(PATH_STEP / speeds_between)]) + stand
-    t = np.arange(0.0, times[-1] + stand, TIME_STEP)
-    distance = np.interp(t, times, np.arange(len(speeds)) * PATH_STEP)
+    times, steps = np.concatenate([[0.0], np.cumsum(PATH_STEP / speeds_between)]), np.arange(len(speeds))
+    rests = [(round(place / PATH_STEP), seconds) for place, seconds in pauses]
+    times = times + sum(seconds * (steps > index) for index, seconds in rests)
+    going_on = [(times[index] + seconds, index) for index, seconds in rests]
+    times, steps = np.concatenate([[times, steps], np.transpose(going_on)], axis=1)
+    order = times.argsort(kind="stable")
+    t = np.arange(0.0, times.max() + stand, TIME_STEP)
+    distance = np.interp(t, times[order], steps[order] * PATH_STEP)
     return gaussian_filter1d(distance, 0.15 / TIME_STEP, mode="nearest")
 
 
@@ -375,11 +460,17 @@ def gait_phases(distance):
     return np.cumsum(2 * np.pi * STRIDE_RATE * np.sqrt(speeds) * TIME_STEP)
 
 
-def check_room(positions):
-    """Raise ValueError where a walk comes too near to the background."""
-    room = background_distance(positions) - SHOULDERS / 2
+def check_room(positions, scene, from_background):
+    """Raise ValueError where a walk leads through an object or comes too near to the background."""
+    room = scene.room.distance(positions) - SHOULDERS / 2
     nearest = np.argmin(room)
-    if room[nearest] < BACKGROUND_CLEARANCE:
-        rule = f"{BACKGROUND_CLEARANCE} m between shoulder and background"
+    if room[nearest] < from_background:
+        rule = f"{from_background} m between shoulder and background"
         place = np.round(positions[nearest], 2).tolist()
         raise ValueError(f"a walk must keep {rule}, got {room[nearest]:.2f} m at {place}")
+    if scene.objects:
+        gaps = outline_distances(positions, [each.footprint for each in scene.objects])
+        when, which = np.unravel_index(gaps.argmin(), gaps.shape)
+        if gaps[when, which] < DEPTH / 2:
+            place = np.round(positions[when], 2).tolist()
+            raise ValueError(f"a walk must not lead through an object, got object {which} at {place}")

@@ -4,19 +4,25 @@ On disk: a CARMEN log, the truth as CSV, the scene as JSON. Nothing here needs P
 """
 
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from dollop.formats.files import FormatError, whole_file
+from dollop.formats.files import FormatError, from_file, whole_file
 from dollop.formats.logs import read_log, write_log
 from dollop.lab.scenes import Scene
 from dollop.laser import LaserLog
 
-__all__ = ["Recording", "TRUTH_COLUMNS"]
+__all__ = ["MOVED_COLUMNS", "ROBOT_COLUMNS", "Recording", "TRUTH_COLUMNS"]
 
 TRUTH_COLUMNS = ["t", "x", "y", "heading"]
+"""Of the first person; the others' end in their number: x_1, y_1, heading_1."""
+MOVED_COLUMNS = ["object_x", "object_y"]
+"""Of an object that is moved, which end in its number: object_x_0, object_y_0."""
+ROBOT_COLUMNS = ["laser_x", "laser_y", "laser_theta"]
+"""True pose of the laser, where its robot drives."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +32,13 @@ class Recording:
     Attributes
     ----------
     log : LaserLog
-        T scans from the standing robot.
+        T scans from the robot.
     truth : pandas.DataFrame
-        The walker at each scan, no rows if nobody walks: t in s, x and y in m, heading in rad.
+        Whoever and whatever moves, at each scan, in s, m and rad: `TRUTH_COLUMNS` of the person who
+        shows the task, the others', moved objects', and the laser's own where its robot drives. No
+        rows if nothing moves.
     scene : Scene
-        What stood where.
+        What stood where at the beginning, and who was to walk where.
     """
 
     log: LaserLog
@@ -38,8 +46,7 @@ class Recording:
     scene: Scene
 
     def __repr__(self):
-        walker = "with a walker" if len(self.truth) else "nobody walking"
-        return f"Recording, {walker}: {self.log}; {self.scene}"
+        return f"Recording: {self.log}; {self.scene}"
 
     def save(self, path):
         """Write the log, and beside it the truth and the scene.
@@ -86,19 +93,22 @@ def load_truth(path, n_scans):
         truth = pd.read_csv(path, dtype=float)
     except ValueError as error:
         raise FormatError(f"not a table of numbers: {error}", path) from error
-    if list(truth.columns) != TRUTH_COLUMNS or len(truth) not in (0, n_scans):
-        rule = f"columns must be {TRUTH_COLUMNS} and rows {n_scans}, one for each scan"
-        got = f"got {list(truth.columns)} and {len(truth)}"
-        raise FormatError(f"{rule}, or none if nobody walks, {got}", path)
+    kinds = {re.sub(r"_\d+$", "", name) for name in truth.columns}
+    known = {*TRUTH_COLUMNS, *MOVED_COLUMNS, *ROBOT_COLUMNS}
+    if "t" not in truth or not kinds <= known or len(truth) not in (0, n_scans):
+        rule = f"columns must be t and of {sorted(known - {'t'})}, and rows {n_scans}, one for each scan"
+        got = f"got {', '.join(map(str, truth.columns))} and {len(truth)}"
+        raise FormatError(f"{rule}, or none if nothing moves, {got}", path)
     return truth
 
 
 def load_scene(path):
     """Read a scene from JSON."""
     try:
-        return Scene(**json.loads(Path(path).read_text()))
-    except (TypeError, ValueError) as error:
+        content = json.loads(Path(path).read_text())
+    except (ValueError, RecursionError) as error:
         raise FormatError(f"not a scene: {error}", path) from error
+    return from_file(path, Scene.from_dict, content)
 
 
 def companions(path):

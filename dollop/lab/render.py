@@ -1,30 +1,28 @@
-"""Pictures of the laboratory, by PyBullet's software renderer: no display or graphics card needed.
+"""Pictures of the laboratory, or of any scene: what there is to look at, in place of what beams meet.
 
-The renderer draws collision shapes where it finds no others, so a picture is taken in a server of
-its own that holds only things to look at.
+A picture is taken in a simulator of its own that holds nothing else.
 """
 
 import tempfile
 from pathlib import Path
 
 import numpy as np
-import pybullet
 from matplotlib.image import imsave
 
-from dollop.lab.pioneer import Pioneer
-from dollop.lab.scenes import FURNITURE, KINDS, ROOM, WHITE, Part, figure_eight_scene
-from dollop.lab.world import Server, body_offsets
+from dollop.lab.engine import Engine
+from dollop.lab.person import body_offsets
+from dollop.lab.pioneer import put_pioneer
+from dollop.lab.rooms import LABORATORY, panel, walls
+from dollop.lab.scenes import figure_eight_scene
 from dollop.pose import rotation
 
 __all__ = ["render_lab", "render_robot"]
 
-SUPERSAMPLING = 2
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-LIGHT = np.array([-0.35, -0.45, 0.82])
 CLOTH, JEANS = (0.16, 0.38, 0.55), (0.17, 0.20, 0.30)
 SKIN, HAIR = (0.80, 0.60, 0.47), (0.20, 0.13, 0.08)
 ORANGE, PALE = (0.93, 0.36, 0.06), (0.95, 0.94, 0.90)
-BIN, BAG = (0.33, 0.35, 0.37), (0.10, 0.10, 0.11)
+BIN, BAG, OAK = (0.33, 0.35, 0.37), (0.10, 0.10, 0.11), (0.72, 0.53, 0.33)
 CHEST = [(0.20, 0.42), (0.205, 0.54), (0.15, 0.60), (0.05, 0.63)]
 TORSO = [(0.10, 0.0), (0.165, 0.02), (0.16, 0.15), *CHEST]
 
@@ -41,22 +39,22 @@ def render_robot(width=1200, height=900):
     -------
     (height, width, 3) uint8 array
     """
-    with Server() as studio:
-        furnish(studio)
-        Pioneer(studio, (4.5, 3.2, -2.0))
-        return photograph(studio, (4.72, 2.02, 0.56), (4.51, 3.2, 0.24), 31.0, width, height)
+    with Engine() as studio:
+        furnish(studio, LABORATORY)
+        put_pioneer(studio, (4.5, 3.2, -2.0))
+        return studio.photograph((4.72, 2.02, 0.56), (4.51, 3.2, 0.24), 31.0, width, height)
 
 
-def render_lab(scene=None, walker=None, width=1200, height=900):
-    """The laboratory with robot and objects, from above the wall behind the robot (Fig. 5).
+def render_lab(scene=None, walkers=(), width=1200, height=900):
+    """A room with robot and objects, from above the wall at its lower end (Fig. 5).
 
     Parameters
     ----------
     scene : Scene, optional
         `figure_eight_scene()` when not given.
-    walker : tuple, optional
-        Position (2,) in m, heading in rad and gait phase in rad of a person to show, as `Walk.at`
-        gives them.
+    walkers : sequence of tuples
+        Position (2,) in m, heading in rad and gait phase in rad of each person to show, as
+        `Walk.at` gives them.
     width, height : int
         Pixels.
 
@@ -65,81 +63,55 @@ def render_lab(scene=None, walker=None, width=1200, height=900):
     (height, width, 3) uint8 array
     """
     scene = scene or figure_eight_scene()
-    with Server() as studio:
-        furnish(studio)
-        for kind, position in zip(scene.kinds, scene.positions, strict=True):
-            LOOKS[kind](studio, KINDS[kind], position)
-        Pioneer(studio, scene.robot)
-        if walker is not None:
+    with Engine() as studio:
+        furnish(studio, scene.room)
+        for each in scene.objects:
+            show_object(studio, each)
+        put_pioneer(studio, scene.robot.pose)
+        for walker in walkers:
             show_person(studio, *walker)
-        return photograph(studio, (2.2, -3.6, 4.3), (4.45, 3.4, 0.25), 50.0, width, height)
+        return studio.photograph(*viewpoint(scene.room), 50.0, width, height)
 
 
-def photograph(studio, eye, target, view_angle, width, height):
-    """What is seen from `eye` (3,) to `target` (3,) in m, under a vertical `view_angle` in deg."""
-    eye, target = recentred(studio, eye, target)
-    fine = SUPERSAMPLING * width, SUPERSAMPLING * height
-    lens = pybullet.computeProjectionMatrixFOV(view_angle, width / height, 0.1, 20.0)
-    pixels = studio.call(
-        "getCameraImage",
-        *fine,
-        viewMatrix=pybullet.computeViewMatrix(eye, target, (0.0, 0.0, 1.0)),
-        projectionMatrix=lens,
-        lightDirection=LIGHT.tolist(),
-        lightDistance=12,
-        lightAmbientCoeff=0.58,
-        lightDiffuseCoeff=0.46,
-        lightSpecularCoeff=0.15,
-        shadow=1,
-        renderer=pybullet.ER_TINY_RENDERER,
-    )[2]
-    pixels = np.asarray(pixels, dtype=float)
-    image = pixels.reshape(height, SUPERSAMPLING, width, SUPERSAMPLING, 4).mean(axis=(1, 3))
-    return np.round(image[..., :3]).astype(np.uint8)
+def viewpoint(room):
+    """From where and whereto a picture of a room is taken, (3,) and (3,) in m: higher up for larger rooms."""
+    left, low, right, high = room.bounds
+    scale = max((right - left) / 9.0, (high - low) / 7.0)
+    middle = (left + right) / 2
+    eye = middle - 2.3 * scale, low - 3.6 * scale, 4.3 * scale
+    return eye, (middle - 0.05, low + 3.4 / 7.0 * (high - low), 0.25)
 
 
-def recentred(studio, eye, target):
-    """Move the target to the origin, round which alone the renderer casts good shadows."""
-    centre = np.array([*target[:2], 0.0])
-    for index in range(studio.call("getNumBodies")):
-        body = studio.call("getBodyUniqueId", index)
-        position, orientation = studio.call("getBasePositionAndOrientation", body)
-        studio.call("resetBasePositionAndOrientation", body, position - centre, orientation)
-    return eye - centre, target - centre
-
-
-def furnish(studio):
-    """Floor, furniture and the two walls that do not stand before the camera."""
-    show_floor(studio)
-    width, depth = ROOM
-    panels = [
-        Part("box", (width / 2, depth + 0.05, 1.2), (width + 0.2, 0.1, 2.4), WHITE),
-        Part("box", (width + 0.05, depth / 2, 1.2), (0.1, depth, 2.4), WHITE),
-        Part("box", (-0.05, depth / 2, 1.2), (0.1, depth, 2.4), WHITE),
-        Part("box", (width / 2, depth - 0.01, 0.05), (width, 0.02, 0.1), BIN),
-        Part("box", (width - 0.01, depth / 2, 0.05), (0.02, depth, 0.1), BIN),
-    ]
-    for part in (*panels, *FURNITURE):
+def furnish(studio, room):
+    """Floor, furniture and the walls that do not stand before the camera, those opposite with skirtings."""
+    show_floor(studio, room.bounds)
+    eye, target = (np.array(place[:2]) for place in viewpoint(room))
+    for corner, end, wall in zip(room.corners, np.roll(room.corners, -1, axis=0), walls(room), strict=True):
+        along = (end - corner) / np.linalg.norm(end - corner)
+        inwards = np.array([-along[1], along[0]])
+        if (eye - corner) @ inwards > 0:
+            show_part(studio, wall)
+        if (target - eye) @ inwards < 0:
+            middle, length = (corner + end) / 2 + 0.01 * inwards, np.linalg.norm(end - corner)
+            show_part(studio, panel(middle, length, along, 0.02, 0.1, BIN))
+    for part in room.furniture:
         show_part(studio, part)
 
 
 def show_part(studio, part):
     """A box, or a cylinder rounder than PyBullet's own."""
     x, y, z = part.centre
-    half = [extent / 2 for extent in part.size]
     if part.shape == "box":
-        show(studio, part.centre, part.colour, pybullet.GEOM_BOX, halfExtents=half)
+        studio.show(part.centre, part.colour, part.size, orientation=about_vertical(part.turn))
     else:
-        radius, height = half[0], 2 * half[2]
+        radius, height = part.size[0] / 2, part.size[2]
         profile = [(0, 0), (radius, 0), (radius, height), (0, height)]
-        show_lathed(studio, (x, y, z - half[2]), profile, part.colour)
+        show_lathed(studio, (x, y, z - height / 2), profile, part.colour)
 
 
-def show(studio, position, colour, kind, orientation=UPRIGHT, **size):
-    """A coloured thing without weight; the orientation is a quaternion x, y, z, w."""
-    paint = {"rgbaColor": (*colour, 1.0), "specularColor": (0.2, 0.2, 0.2)}
-    shape = studio.call("createVisualShape", kind, **paint, **size)
-    return studio.call("createMultiBody", 0, -1, shape, position, orientation)
+def about_vertical(turn):
+    """Quaternion of a turn in rad."""
+    return 0.0, 0.0, float(np.sin(turn / 2)), float(np.cos(turn / 2))
 
 
 def show_lathed(studio, position, profile, colour, squash=1.0, orientation=UPRIGHT):
@@ -148,7 +120,7 @@ def show_lathed(studio, position, profile, colour, squash=1.0, orientation=UPRIG
     mesh = {"vertices": vertices, "indices": indices, "normals": normals}
     mesh = {name: part.tolist() for name, part in mesh.items()}
     uvs = [[0.0, 0.0]] * len(vertices)
-    return show(studio, position, colour, pybullet.GEOM_MESH, orientation, **mesh, uvs=uvs)
+    return studio.show(position, colour, mesh={**mesh, "uvs": uvs}, orientation=orientation)
 
 
 def lathe(profile, squash, sides=48):
@@ -190,22 +162,21 @@ def band(low, high, turn, squash):
     return np.concatenate([lower, upper]), np.tile(normal, (2, 1))
 
 
-def show_floor(studio, tile=0.5, margin=4.0):
+def show_floor(studio, bounds, tile=0.5, margin=4.0):
     """Linoleum tiles of `tile` m reaching `margin` m beyond the room."""
-    low, high = -margin, np.array(ROOM) + margin
-    right, top = high
+    (low, front), (right, top) = bounds[:2] - margin, bounds[2:] + margin
+    tiles = np.array([(low, front), (right, front), (right, top), (low, top)]) - (low, front)
     mesh = {
-        "vertices": [(low, low, 0.0), (right, low, 0.0), (right, top, 0.0), (low, top, 0.0)],
+        "vertices": [(low, front, 0.0), (right, front, 0.0), (right, top, 0.0), (low, top, 0.0)],
         "indices": [0, 1, 2, 0, 2, 3],
         "normals": [(0.0, 0.0, 1.0)] * 4,
-        "uvs": (np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * (high - low) / (2 * tile)).tolist(),
+        "uvs": (tiles / (2 * tile)).tolist(),
     }
-    floor = show(studio, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), pybullet.GEOM_MESH, **mesh)
+    floor = studio.show((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), mesh=mesh)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "tiles.png"
         imsave(path, tile_texture())
-        texture = studio.call("loadTexture", str(path))
-        studio.call("changeVisualShape", floor, -1, textureUniqueId=texture)
+        studio.paper(floor, path)
 
 
 def tile_texture(size=256):
@@ -219,31 +190,38 @@ def tile_texture(size=256):
     return np.clip(shade[..., None] * np.array([1.0, 0.985, 0.95]), 0.0, 1.0)
 
 
-def show_can(studio, kind, position):
+def show_object(studio, each):
+    """A trash can, a cone, or a carton."""
+    if each.shape == "box":
+        (x, y), (width, depth), turn = each.position, each.size, about_vertical(each.turn)
+        studio.show((x, y, each.height / 2), OAK, (width, depth, each.height), orientation=turn)
+        return
+    look = show_can if each.shape == "cylinder" else show_cone
+    look(studio, each)
+
+
+def show_can(studio, each):
     """A trash can: tapered wall, rim, and the bag inside."""
-    r, h = kind.beam_radius, kind.height
-    foot = (*position, 0.0)
+    r, h = each.size[0] / 2, each.height
+    foot = (*each.position, 0.0)
     show_lathed(studio, foot, [(0, 0), (0.92 * r, 0), (1.04 * r, h)], BIN)
-    rim = [(1.10 * r, h - 0.05), (1.10 * r, h), (0.98 * r, h), (0.94 * r, h - 0.2)]
+    rim = [(1.10 * r, h - 0.05), (1.10 * r, h), (0.98 * r, h), (0.94 * r, max(h - 0.2, h / 2))]
     show_lathed(studio, foot, rim, BAG)
     show_lathed(studio, foot, [(0.95 * r, h - 0.12), (0, h - 0.12)], BAG)
 
 
-def show_cone(studio, kind, position):
+def show_cone(studio, each):
     """A slalom cone: square foot, orange cone, white band."""
-    slope = 0.17 / kind.height
 
     def radius(height):
-        return kind.beam_radius + slope * (0.36 - height)
+        return each.outline(min(height, each.height * 0.999)).radius
 
-    half = kind.foot_radius / np.sqrt(2)
-    show(studio, (*position, 0.02), BAG, pybullet.GEOM_BOX, halfExtents=[half, half, 0.02])
-    bands = (0.04, 0.45, ORANGE), (0.45, 0.70, PALE), (0.70, kind.height, ORANGE)
+    half = each.reach / np.sqrt(2)
+    studio.show((*each.position, 0.02), BAG, (2 * half, 2 * half, 0.04))
+    bands = (0.04, 0.45, ORANGE), (0.45, 0.70, PALE), (0.70, 1.0, ORANGE)
     for low, high, colour in bands:
-        show_lathed(studio, (*position, 0.0), [(radius(low), low), (radius(high), high)], colour)
-
-
-LOOKS = {"trash can": show_can, "cone": show_cone}
+        low, high = low * each.height, high * each.height
+        show_lathed(studio, (*each.position, 0.0), [(radius(low), low), (radius(high), high)], colour)
 
 
 def show_person(studio, position, heading, phase):
@@ -260,7 +238,7 @@ def show_person(studio, position, heading, phase):
         ends = [(*position, 0.0) + turn @ np.asarray(point) for point in (start, end)]
         show_limb(studio, *ends, radii, colour)
 
-    for (ahead, left), side in zip(body_offsets(True, phase), (1, -1), strict=True):
+    for (ahead, left), side in zip(body_offsets("legs", phase), (1, -1), strict=True):
         knee, elbow, hand = 0.3 * ahead + 0.03, -0.5 * ahead - 0.02, -1.1 * ahead + 0.04
         out = 0.255 * side
         put((ahead + 0.04, left, 0.0), [(0.045, 0), (0.05, 0.05), (0.02, 0.09)], BAG, 2.4)

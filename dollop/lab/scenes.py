@@ -1,305 +1,618 @@
-"""What stands where in the laboratory: background furniture, and the movable objects of a scene.
+"""Scenes: a room, the movable objects in it, the robot that watches, and who walks where.
 
-A reconstruction: the paper shows its laboratory in one photograph (Fig. 5). The room is 9 m by 7 m,
-its lower left corner the origin of the world. Nothing here needs PyBullet.
+A scene is data: it can be written, read and drawn (`dollop.plot.scene`), and what is recorded of it
+follows from it and a seed. Nothing here needs PyBullet.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field, fields, replace
 
 import numpy as np
 
+from dollop.checks import check_choice, check_positive, checked_array, put_in
+from dollop.lab.outlines import Outline, gaps
+from dollop.lab.rooms import LABORATORY, Part, Room
+from dollop.lab.scanner import MODELS, Scanner, SickLMS200
+from dollop.pose import moved_pose
+
 __all__ = [
-    "BACKGROUND",
     "BEAM_HEIGHT",
-    "FURNITURE",
-    "KINDS",
-    "Part",
-    "ROOM",
+    "HIGHEST_BEAM",
+    "Move",
+    "Object",
+    "Person",
+    "Robot",
+    "SHAPES",
     "Scene",
-    "WHITE",
-    "background_distance",
     "empty_scene",
     "figure_eight_scene",
     "moved",
+    "object_gaps",
     "rearranged",
     "slalom_scene",
 ]
 
-ROOM = (9.0, 7.0)
-WALL_HEIGHT = 2.4
-WALL_THICKNESS = 0.10
-SPACING = 0.45
-"""Least free distance in m round an object: the radius of Sec. II swallows what is nearer."""
 BEAM_HEIGHT = 0.36
 """Height of the laser's plane over the floor in m: a SICK LMS 200 on the deck of a Pioneer 2 DX."""
-
-OAK, STEEL, WHITE = (0.72, 0.53, 0.33), (0.55, 0.58, 0.62), (0.90, 0.89, 0.85)
-DARK, GREY, BLUE = (0.13, 0.14, 0.16), (0.42, 0.44, 0.47), (0.30, 0.48, 0.66)
+HIGHEST_BEAM = 1.4
+"""m: a beam over people's shoulders sees nobody."""
+SHAPES = ("box", "cylinder", "cone")
+BODIES = ("torso", "legs")
+SHOULDERS = 0.45
+FORMAT, VERSION = "dollop scene", 1
 
 
 @dataclass(frozen=True)
-class Part:
-    """One upright box or cylinder of a thing.
+class Object:
+    """A foreground object, which can stand elsewhere next time (Sec. II).
 
     Attributes
     ----------
     shape : str
-        "box" or "cylinder".
-    centre : tuple of 3 floats
-        x, y, z in m.
-    size : tuple of 3 floats
-        Full extent along x, y, z in m; of a cylinder the first two are its diameter.
-    colour : tuple of 3 floats
-        Red, green, blue in 0 to 1.
-    """
-
-    shape: str
-    centre: tuple
-    size: tuple
-    colour: tuple
-
-    @property
-    def bounds(self):
-        """Footprint xmin, ymin, xmax, ymax in m."""
-        (x, y, _), (width, depth, _) = self.centre, self.size
-        return x - width / 2, y - depth / 2, x + width / 2, y + depth / 2
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A sort of foreground object.
-
-    Attributes
-    ----------
-    beam_radius : float
-        Radius in m where the laser meets it.
-    foot_radius : float
-        Radius in m of the circle round its widest part, which a walker or a robot must avoid.
+        "box", "cylinder" or "cone".
+    position : tuple of 2 floats
+        Its middle in m.
+    size : tuple of 2 floats
+        Width and depth in m along its own axes, at the floor; of what is round both are the
+        diameter.
     height : float
-        Height in m.
-    """
-
-    beam_radius: float
-    foot_radius: float
-    height: float
-
-
-KINDS = {"trash can": Kind(0.18, 0.18, 0.66), "cone": Kind(0.13, 0.28, 1.0)}
-
-
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """The movable half of the laboratory: foreground objects, and where the robot stands (Fig. 5).
-
-    Attributes
-    ----------
-    kinds : tuple of N str
-        The kind of each foreground object, a key of `KINDS`.
-    positions : (N, 2) float array
-        Their centres in m.
-    robot : tuple of 3 floats
-        Pose of the robot: x, y in m, theta in rad.
+        In m.
+    turn : float
+        Of its axes, in rad.
+    top : float
+        Diameter of a cone at its top in m.
+    foot : float
+        Diameter in m of a flat foot of a cone, no higher than 6 cm; none if it is 0.
 
     Raises
     ------
     ValueError
-        If an object is of no known kind, stands outside the room, or nearer than 0.45 m to the
-        background or to another object: nearer than that the background radius of Sec. II would
-        swallow part of it.
+        For an unknown shape, a number that is not finite, or one that is not positive where it must
+        be.
 
     Examples
     --------
     The laser meets a cone above its foot, where it is narrower.
 
-    >>> scene = Scene(("cone",), [(4.5, 3.5)])
-    >>> xmin, ymin, xmax, ymax = scene.boxes[0]
-    >>> bool(xmax - xmin < 2 * scene.foot_radii[0])
-    True
+    >>> cone = Object.cone((4.5, 3.5))
+    >>> round(cone.outline(BEAM_HEIGHT).radius, 6), cone.outline(1.2), cone.reach
+    (0.13, None, 0.28)
     """
 
-    kinds: tuple
-    positions: np.ndarray
-    robot: tuple = (4.5, 0.6, np.pi / 2)
+    shape: str
+    position: tuple
+    size: tuple
+    height: float
+    turn: float = 0.0
+    top: float = 0.0
+    foot: float = 0.0
 
     def __post_init__(self):
-        object.__setattr__(self, "kinds", tuple(self.kinds))
-        object.__setattr__(self, "positions", np.array(self.positions, dtype=float).reshape(-1, 2))
-        object.__setattr__(self, "robot", tuple(float(value) for value in self.robot))
-        check_objects(self.kinds, self.positions)
+        check_choice("shape", self.shape, SHAPES)
+        for name in ("position", "size"):
+            object.__setattr__(self, name, tuple(checked_array(name, getattr(self, name), 2).tolist()))
+        check_positive("size", min(self.size))
+        check_positive("height", self.height)
+        checked_array("turn", [self.turn], 1)
+        for name in ("top", "foot"):
+            check_positive(name, getattr(self, name), or_zero=True)
+        if self.shape != "box" and self.size[0] != self.size[1]:
+            raise ValueError(f"a {self.shape} must be as deep as wide, got {self.size}")
 
-    def __repr__(self):
-        objects = ", ".join(f"{kind} ({x:.2f}, {y:.2f})" for kind, (x, y) in self._placed())
-        return f"Scene of {objects or 'nothing'}"
+    @classmethod
+    def trash_can(cls, position):
+        """One of the paper's trash cans (Fig. 5).
 
-    def _placed(self):
-        return zip(self.kinds, self.positions, strict=True)
+        Parameters
+        ----------
+        position : (2,) sequence of float
+            In m.
+
+        Returns
+        -------
+        Object
+        """
+        return cls("cylinder", position, (0.36, 0.36), 0.66)
+
+    @classmethod
+    def cone(cls, position):
+        """One of the paper's slalom cones (Fig. 11).
+
+        Parameters
+        ----------
+        position : (2,) sequence of float
+            In m.
+
+        Returns
+        -------
+        Object
+        """
+        return cls("cone", position, (0.3824, 0.3824), 1.0, top=0.0424, foot=0.56)
+
+    def outline(self, height):
+        """What a plane at some height cuts out of it.
+
+        Parameters
+        ----------
+        height : float
+            Over the floor in m.
+
+        Returns
+        -------
+        Outline or None
+            None where it is not as high.
+        """
+        if height >= self.height:
+            return None
+        if self.shape == "box":
+            return self.footprint
+        slope = (self.top - self.size[0]) / self.height if self.shape == "cone" else 0.0
+        return Outline(*self.position, radius=(self.size[0] + slope * height) / 2)
 
     @property
-    def beam_radii(self):
-        """(N,) radius of each object in m at the height of the laser."""
-        return np.array([KINDS[kind].beam_radius for kind in self.kinds])
+    def footprint(self):
+        """Outline of its widest part, which a walker or a robot must avoid."""
+        if self.shape == "box":
+            width, depth = self.size
+            return Outline(*self.position, width / 2, depth / 2, self.turn)
+        return Outline(*self.position, radius=self.reach)
+
+    @property
+    def reach(self):
+        """Radius in m of the circle round its widest part."""
+        if self.shape == "box":
+            return float(np.hypot(*self.size)) / 2
+        return max(self.size[0], self.foot) / 2
+
+    def at(self, position):
+        """The object elsewhere.
+
+        Parameters
+        ----------
+        position : (2,) sequence of float
+            In m.
+
+        Returns
+        -------
+        Object
+        """
+        return replace(self, position=position)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """The robot that watches, a Pioneer 2 DX: where it stands or drives, and the laser on it.
+
+    Attributes
+    ----------
+    pose : tuple of 3 floats
+        x, y in m, theta in rad, at the beginning.
+    scanner : Scanner
+    beam_height : float
+        At which the laser cuts, over the floor in m.
+    laser_ahead : float
+        Laser ahead of the middle of the axle in m (ARIA p2dx.p, LaserX).
+    way : (K, 2) tuple
+        Places in m that it drives to while it observes; it stands if there are none.
+    speed : float
+        On that way, in m/s.
+    radius : float
+        Of the disc that it covers, in m (ARIA p2dx.p).
+
+    Raises
+    ------
+    ValueError
+        For a number out of its range; of the beam height, above everything.
+    """
+
+    pose: tuple = (4.5, 0.6, np.pi / 2)
+    scanner: Scanner = field(default_factory=SickLMS200)
+    beam_height: float = BEAM_HEIGHT
+    laser_ahead: float = 0.017
+    way: tuple = ()
+    speed: float = 0.3
+    radius: float = 0.25
+
+    def __post_init__(self):
+        object.__setattr__(self, "pose", tuple(checked_array("the robot's pose", self.pose, 3).tolist()))
+        object.__setattr__(self, "way", as_places("the robot's way", self.way))
+        for name in ("speed", "radius"):
+            check_positive(f"the robot's {name}", getattr(self, name))
+        checked_array("laser_ahead", [self.laser_ahead], 1)
+        if not 0 < self.beam_height < HIGHEST_BEAM:
+            rule = f"the beam height must be over the floor and below people's shoulders, {HIGHEST_BEAM} m"
+            raise ValueError(f"{rule}, got {self.beam_height} m")
+
+    @property
+    def laser_pose(self):
+        """(3,) pose of the laser at the beginning, x, y in m, theta in rad."""
+        return moved_pose(self.pose, self.laser_ahead, 0.0)
+
+
+@dataclass(frozen=True)
+class Person:
+    """Who walks where, as data; `dollop.lab.people` makes a `Walk` of it.
+
+    Attributes
+    ----------
+    places : (K, 2) tuple
+        Places to pass in m, as they are met; a single one for somebody who only stands there.
+    speed : float
+        On a straight line in m/s; it falls in curves.
+    body : str
+        "torso": what a laser at waist height meets; "legs": two, striding.
+    begin : float
+        Time in s at which the person sets off.
+    stops : tuple of (int, float)
+        At which places the person stops for how many s.
+    laps : int
+        How often the places are walked round.
+    back : bool
+        Whether the same way is walked back.
+    scatter : float
+        Standard deviation in m by which a place is missed, anew in every lap.
+    times : tuple of K floats
+        When the person is at each place, in s from `begin`: a walk that is replayed. `speed`,
+        `stops`, `laps`, `back` and `scatter` then say nothing.
+    seed : int
+        What chance there is in the walk comes from it.
+
+    Raises
+    ------
+    ValueError
+        For a number out of its range, a body that there is not, a stop at no place.
+    """
+
+    places: tuple
+    speed: float = 1.05
+    body: str = "torso"
+    begin: float = 1.5
+    stops: tuple = ()
+    laps: int = 1
+    back: bool = False
+    scatter: float = 0.0
+    times: tuple = ()
+    seed: int = 0
+
+    def __post_init__(self):
+        object.__setattr__(self, "places", as_places("a person's places", self.places))
+        object.__setattr__(self, "times", tuple(checked_array("times", self.times, "K").tolist()))
+        if not self.places:
+            raise ValueError("a person needs a place to be, got none")
+        check_choice("body", self.body, BODIES)
+        if not 0.1 <= self.speed <= 3.0:
+            raise ValueError(f"a person walks at 0.1 to 3 m/s, got {self.speed}")
+        check_positive("begin", self.begin, or_zero=True)
+        check_positive("scatter", self.scatter, or_zero=True)
+        put_in(self, laps=whole("laps", self.laps, 1), seed=whole("seed", self.seed, 0))
+        for k, seconds in self.stops:
+            check_positive("the time of a stop", seconds)
+            if k not in range(len(self.places)):
+                raise ValueError(f"a stop must be at one of {len(self.places)} places, got place {k}")
+        put_in(self, stops=tuple((int(k), float(seconds)) for k, seconds in self.stops))
+        if self.times and (len(self.times) != len(self.places) or min(np.diff(self.times), default=1) <= 0):
+            rule = f"times must increase, one for each of {len(self.places)} places"
+            raise ValueError(f"{rule}, got {len(self.times)}")
+
+
+@dataclass(frozen=True)
+class Move:
+    """Somebody moves an object while the laser watches.
+
+    Attributes
+    ----------
+    object : int
+        Which one.
+    begin, seconds : float
+        When, and how long it takes, in s.
+    to : tuple of 2 floats
+        Where it stands afterwards, in m.
+
+    Raises
+    ------
+    ValueError
+        For a number out of its range.
+    """
+
+    object: int
+    begin: float
+    to: tuple
+    seconds: float = 1.0
+
+    def __post_init__(self):
+        object.__setattr__(self, "to", tuple(checked_array("to", self.to, 2).tolist()))
+        check_positive("begin", self.begin, or_zero=True)
+        check_positive("seconds", self.seconds)
+
+
+def whole(name, value, least):
+    """A whole number, not below the least, as an int."""
+    if not (least <= value < np.inf and value == int(value)):
+        raise ValueError(f"{name} must be a whole number, {least} or more, got {value}")
+    return int(value)
+
+
+def as_places(name, values):
+    """Places (K, 2) as a tuple of tuples."""
+    return tuple(
+        map(tuple, checked_array(name, np.reshape(values, (-1, 2)) if len(values) == 0 else values, "K", 2).tolist())
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A room and all that is in it; the paper's laboratory by default (Fig. 5).
+
+    Attributes
+    ----------
+    objects : tuple of N Object
+        The movable foreground objects.
+    room : Room
+        The background.
+    robot : Robot
+        Who watches.
+    people : tuple of Person
+        Who walks where; the first one shows the task.
+    moves : tuple of Move
+        Objects that are moved meanwhile.
+
+    Raises
+    ------
+    ValueError
+        If an object, the robot or somebody's place is outside the room, in a wall, in furniture or
+        in something else, or two people begin in one place.
+
+    Examples
+    --------
+    >>> Scene([Object.trash_can((2.5, 3.6)), Object.trash_can((2.7, 3.6))])
+    Traceback (most recent call last):
+    ValueError: objects must not stand in each other, got object 0 at (2.5, 3.6) and object 1 at (2.7, 3.6)
+    """
+
+    objects: tuple = ()
+    room: Room = LABORATORY
+    robot: Robot = field(default_factory=Robot)
+    people: tuple = ()
+    moves: tuple = ()
+
+    def __post_init__(self):
+        put_in(self, objects=tuple(self.objects), people=tuple(self.people), moves=tuple(self.moves))
+        check_objects(self)
+        check_robot(self)
+        check_people(self)
+        check_moves(self)
+
+    def __repr__(self):
+        objects = ", ".join(f"{each.shape} {rounded(each.position)}" for each in self.objects)
+        people = f", {len(self.people)} people" if self.people else ""
+        return f"Scene of {objects or 'nothing'}{people}"
+
+    @property
+    def positions(self):
+        """(N, 2) middles of the objects in m."""
+        return np.array([each.position for each in self.objects]).reshape(-1, 2)
 
     @property
     def foot_radii(self):
-        """(N,) radius in m of the circle round each object's foot."""
-        return np.array([KINDS[kind].foot_radius for kind in self.kinds])
+        """(N,) radius in m of the circle round each object's widest part."""
+        return np.array([each.reach for each in self.objects])
 
     @property
     def boxes(self):
-        """(N, 4) true bounding boxes xmin, ymin, xmax, ymax in m at the height of the laser."""
-        radii = self.beam_radii[:, None]
-        return np.hstack([self.positions - radii, self.positions + radii])
+        """(M, 4) true bounding boxes in m, at the height of the laser, of the objects that it can meet."""
+        outlines = [each.outline(self.robot.beam_height) for each in self.objects]
+        return np.array([each.bounds for each in outlines if each is not None]).reshape(-1, 4)
+
+    @property
+    def section(self):
+        """Outlines of walls, furniture and objects at the height of the laser, a tuple."""
+        height = self.robot.beam_height
+        parts = [part.outline for part in self.room.parts if part.reaches(height)]
+        objects = [each.outline(height) for each in self.objects]
+        return tuple(parts + [each for each in objects if each is not None])
+
+    def with_objects_at(self, positions):
+        """The scene with its objects elsewhere.
+
+        Parameters
+        ----------
+        positions : (N, 2) array_like
+            In m.
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        ValueError
+            If an object does not stand free there.
+        """
+        places = checked_array("positions", positions, len(self.objects), 2)
+        return replace(self, objects=tuple(map(Object.at, self.objects, places)))
 
     def to_dict(self):
-        """The scene as plain lists, for JSON.
+        """The scene as plain lists and numbers, for JSON.
 
         Returns
         -------
         dict
-            The arguments that make the scene again.
         """
-        positions = self.positions.tolist()
-        return {"kinds": list(self.kinds), "positions": positions, "robot": list(self.robot)}
+        content = {"format": FORMAT, "version": VERSION}
+        content |= {each.name: plain(getattr(self, each.name)) for each in fields(self)}
+        return content
+
+    @classmethod
+    def from_dict(cls, content):
+        """The scene that `to_dict` told of.
+
+        Parameters
+        ----------
+        content : dict
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        ValueError
+            If it is of another format or version, a part is missing or unknown, or it is no scene.
+        """
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            raise ValueError(f"not a scene: format must be {FORMAT!r}")
+        if content.get("version") is not VERSION:
+            raise ValueError(f"the version of a scene must be {VERSION}, got {content.get('version')!r}")
+        content = {name: value for name, value in content.items() if name not in ("format", "version")}
+        try:
+            room = made(Room, content["room"], furniture=lambda parts: tuple(made(Part, each) for each in parts))
+            robot = made(Robot, content["robot"], scanner=scanner_from)
+            lists = {"objects": Object, "people": Person, "moves": Move}
+            lists = {name: tuple(made(kind, each) for each in content[name]) for name, kind in lists.items()}
+            unknown = set(content) - {"room", "robot", *lists}
+        except (KeyError, TypeError, AttributeError, OverflowError) as error:
+            raise ValueError(f"a damaged scene: {type(error).__name__} {error}") from error
+        if unknown:
+            raise ValueError(f"a scene has no {', '.join(sorted(unknown))}")
+        return cls(room=room, robot=robot, **lists)
 
 
-def check_objects(kinds, positions):
-    """Raise ValueError unless the objects are of known kinds and stand clear of everything."""
-    if len(kinds) != len(positions):
-        got = f"{len(kinds)} kinds and {len(positions)} positions"
-        raise ValueError(f"a scene needs one position per kind, got {got}")
-    for kind in kinds:
-        if kind not in KINDS:
-            raise ValueError(f"kind must be one of {sorted(KINDS)}, got {kind!r}")
-    radii = np.array([KINDS[kind].beam_radius for kind in kinds])
-    for index, gap in enumerate(free_gaps(positions, radii)):
-        if not gap >= SPACING:
-            rule, place = f"{SPACING} m clear of everything", positions[index].tolist()
-            raise ValueError(f"a {kinds[index]} must stand {rule}, got {gap:.2f} m at {place}")
+def plain(value):
+    """A record of this module as plain lists and numbers."""
+    if isinstance(value, tuple):
+        return [plain(each) for each in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if hasattr(value, "__dataclass_fields__"):
+        return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
+    return value
 
 
-def free_gaps(positions, radii):
-    """(N,) free distance in m from each disc to the nearest other disc or piece of background."""
-    between = np.linalg.norm(positions[:, None] - positions, axis=2) - radii[:, None] - radii
-    np.fill_diagonal(between, np.inf)
-    return np.minimum(background_distance(positions) - radii, between.min(axis=1, initial=np.inf))
+def made(kind, content, **parts):
+    """A record from what `plain` told of it; parts of it are made by functions."""
+    return kind(**{name: parts[name](value) if name in parts else value for name, value in content.items()})
 
 
-def box_distance(points, boxes):
-    """Distance of each point to the nearest of the boxes.
+def scanner_from(content):
+    """A scanner as it was told of; a model on offer must have one of its own modes."""
+    scanner = Scanner(**content)
+    if scanner.model == "SICK LMS 200":
+        mode = "mm" if scanner.step == 0.001 else "cm" if scanner.step == 0.01 else f"{scanner.step:g} m"
+        errors = {name: getattr(scanner, name) for name in ("noise", "bias", "mixed", "jump", "missed")}
+        expected = SickLMS200(scanner.fov, scanner.resolution, mode, **errors)
+    elif scanner.model in MODELS:
+        errors = {name: getattr(scanner, name) for name in ("noise", "bias", "mixed", "jump", "missed")}
+        expected = MODELS[scanner.model](**errors)
+    else:
+        return scanner
+    for name, value in asdict(expected).items():
+        if not np.isclose(value, getattr(scanner, name)) if name != "model" else False:
+            raise ValueError(
+                f"{name} of a {scanner.model} must be {value:g} in this mode, got {getattr(scanner, name):g}"
+            )
+    return scanner
+
+
+# ---- what cannot be
+
+
+def rounded(place):
+    """A place as it is told in a message."""
+    return tuple(round(float(value), 2) for value in place[:2])
+
+
+def check_objects(scene):
+    """Every object stands in the room, and in nothing else."""
+    for k, each in enumerate(scene.objects):
+        check_free(scene, f"object {k}", each.footprint)
+    outlines = [each.footprint for each in scene.objects]
+    for i, outline in enumerate(outlines):
+        for j in np.flatnonzero(gaps(outlines[:i], outline) < 0):
+            told = f"object {j} at {rounded(outlines[j])} and object {i} at {rounded(outline)}"
+            raise ValueError(f"objects must not stand in each other, got {told}")
+
+
+def check_free(scene, name, outline):
+    """An outline lies in the room, clear of walls and furniture."""
+    if not scene.room.holds(outline):
+        raise ValueError(f"{name} must stand in the room and free, got {rounded(outline)}")
+
+
+def check_robot(scene):
+    """The robot stands in the room, and in nothing else, and so do the places that it drives to."""
+    robot = scene.robot
+    if robot.beam_height >= scene.room.height:
+        rule = f"the beam must be below the top of the walls, {scene.room.height} m"
+        raise ValueError(f"{rule}, got {robot.beam_height} m")
+    for name, place in (("the robot", robot.pose), *(("the robot's way", place) for place in robot.way)):
+        disc = Outline(*place[:2], radius=robot.radius)
+        check_free(scene, name, disc)
+        for k in np.flatnonzero(gaps([each.footprint for each in scene.objects], disc) < 0):
+            raise ValueError(f"{name} must not be in an object, got {rounded(place)} and object {k}")
+
+
+def check_people(scene):
+    """People's places are in the room, and no two people begin in one."""
+    for k, person in enumerate(scene.people):
+        for place, free in zip(person.places, scene.room.distance(person.places) > 0, strict=True):
+            if not free:
+                raise ValueError(f"person {k} must walk in the room, got {rounded(place)}")
+        for j in range(k):
+            apart = np.linalg.norm(np.subtract(person.places[0], scene.people[j].places[0]))
+            if apart < SHOULDERS:
+                rule = f"people must begin {SHOULDERS} m apart or more"
+                raise ValueError(f"{rule}, got {apart:.2f} m between person {j} and person {k}")
+
+
+def check_moves(scene):
+    """Moves are of objects that there are, to places that are free when it is done."""
+    objects = list(scene.objects)
+    for move in sorted(scene.moves, key=lambda each: each.begin):
+        if not (isinstance(move.object, int) and 0 <= move.object < len(scene.objects)):
+            raise ValueError(f"a move must be of one of {len(scene.objects)} objects, got object {move.object}")
+        name, each = f"object {move.object}, when moved,", objects[move.object].at(move.to)
+        check_free(scene, name, each.footprint)
+        objects[move.object] = each
+        others = [other.footprint for k, other in enumerate(objects) if k != move.object]
+        if not scene.robot.way:
+            others.append(Outline(*scene.robot.pose[:2], radius=scene.robot.radius))
+        for k in np.flatnonzero(gaps(others, each.footprint) < 0):
+            told = f"{rounded(move.to)}, in what is at {rounded(others[k])}"
+            raise ValueError(f"{name} must not stand in anything, got {told}")
+
+
+def object_gaps(scene):
+    """Free distance round every object, to the next one or to the background.
+
+    Distances are from the circle round an object's widest part.
 
     Parameters
     ----------
-    points : (N, 2) array in m
-    boxes : (M, 4) array of xmin, ymin, xmax, ymax in m
-
-    Returns
-    -------
-    (N,) array in m, zero inside a box.
-
-    Examples
-    --------
-    >>> box_distance([[3.0, 4.0], [-1.0, -1.0]], [[-2.0, -2.0, 0.0, 0.0]])
-    array([5., 0.])
-    """
-    points, boxes = np.asarray(points)[:, None], np.asarray(boxes)
-    outside = np.maximum(np.maximum(boxes[:, :2] - points, points - boxes[:, 2:]), 0.0)
-    return np.hypot(outside[..., 0], outside[..., 1]).min(axis=1)
-
-
-def background_distance(points):
-    """How far points are from the nearest wall or piece of furniture.
-
-    Parameters
-    ----------
-    points : (N, 2) array_like
-        In m.
+    scene : Scene
 
     Returns
     -------
     (N,) float array
-        In m, zero outside the room.
-
-    Examples
-    --------
-    >>> background_distance([(4.5, 3.5), (4.5, 0.4), (4.5, -0.4)]).round(6).tolist()
-    [2.333838, 0.4, 0.0]
+        In m.
     """
-    points = np.asarray(points)
-    inside = np.all((points >= 0.0) & (points <= ROOM), axis=1)
-    return np.where(inside, box_distance(points, BACKGROUND_BOXES), 0.0)
+    return free_gaps(scene, scene.positions)
 
 
-def desk(x, y, width, facing, computer=True):
-    """A desk, its back edge's middle at (x, y), people sitting on the `facing` side (+1: +y)."""
-    depth, top = 0.75, 0.72
-    middle = y + facing * depth / 2
-    left, right = x - width / 2, x + width / 2
-    parts = [
-        Part("box", (x, middle, top + 0.015), (width, depth, 0.03), OAK),
-        Part("box", (left + 0.02, middle, top / 2), (0.04, depth - 0.04, top), OAK),
-        Part("box", (right - 0.02, middle, top / 2), (0.04, depth - 0.04, top), OAK),
-        Part("box", (x, y + facing * 0.06, 0.45), (width - 0.08, 0.03, 0.5), OAK),
-        Part("box", (right - 0.26, middle, 0.31), (0.40, depth - 0.10, 0.60), STEEL),
-    ]
-    return parts + (computer_parts(left + 0.25, y, facing, top + 0.03) if computer else [])
+def free_gaps(scene, positions):
+    """The same if the objects stood at (N, 2) `positions`."""
+    radii = scene.foot_radii
+    between = np.linalg.norm(positions[:, None] - positions, axis=2) - radii[:, None] - radii
+    np.fill_diagonal(between, np.inf)
+    return np.minimum(scene.room.distance(positions) - radii, between.min(axis=1, initial=np.inf))
 
 
-def computer_parts(x, y, facing, top):
-    """A computer under a desk, its screen and keyboard on the desk's top at height `top`."""
-    return [
-        Part("box", (x, y + facing * 0.40, 0.23), (0.20, 0.46, 0.44), DARK),
-        Part("box", (x + 0.45, y + facing * 0.20, top + 0.02), (0.26, 0.18, 0.03), DARK),
-        Part("box", (x + 0.45, y + facing * 0.18, top + 0.10), (0.05, 0.04, 0.16), DARK),
-        Part("box", (x + 0.45, y + facing * 0.20, top + 0.31), (0.48, 0.05, 0.32), DARK),
-        Part("box", (x + 0.45, y + facing * 0.228, top + 0.315), (0.44, 0.01, 0.27), BLUE),
-        Part("box", (x + 0.45, y + facing * 0.52, top + 0.012), (0.44, 0.15, 0.02), WHITE),
-    ]
+def free_room(scene, positions):
+    """Least free distance in m round the scene's objects if they stood at (N, 2) `positions`."""
+    gaps = free_gaps(scene, positions)
+    to_robot = np.linalg.norm(positions - scene.robot.pose[:2], axis=1) - scene.foot_radii
+    return min(gaps.min(initial=np.inf), to_robot.min(initial=np.inf))
 
 
-def stool(x, y):
-    """A laboratory stool: foot, thick column, round seat."""
-    return [
-        Part("box", (x, y, 0.025), (0.34, 0.34, 0.05), DARK),
-        Part("cylinder", (x, y, 0.26), (0.12, 0.12, 0.44), STEEL),
-        Part("cylinder", (x, y, 0.51), (0.36, 0.36, 0.06), (0.16, 0.20, 0.30)),
-    ]
-
-
-def cabinet(x, y, width, depth, height, colour):
-    """A closed cabinet round the point (x, y)."""
-    return [Part("box", (x, y, height / 2), (width, depth, height), colour)]
-
-
-def walls():
-    """The four walls, standing outside the room's 9 m by 7 m."""
-    (width, depth), thick, up = ROOM, WALL_THICKNESS, WALL_HEIGHT
-    return [
-        Part("box", (width / 2, -thick / 2, up / 2), (width + 2 * thick, thick, up), WHITE),
-        Part("box", (width / 2, depth + thick / 2, up / 2), (width + 2 * thick, thick, up), WHITE),
-        Part("box", (-thick / 2, depth / 2, up / 2), (thick, depth, up), WHITE),
-        Part("box", (width + thick / 2, depth / 2, up / 2), (thick, depth, up), WHITE),
-    ]
-
-
-WALLS = walls()
-FURNITURE = [
-    *desk(1.5, ROOM[1], 1.6, -1),
-    *desk(3.3, ROOM[1], 1.6, -1),
-    *desk(5.9, ROOM[1], 1.7, -1),
-    *cabinet(7.3, ROOM[1] - 0.24, 0.80, 0.46, 1.90, STEEL),
-    *desk(1.3, 0.0, 1.6, 1),
-    *desk(7.4, 0.0, 1.8, 1),
-    *cabinet(8.80, 5.95, 0.40, 0.90, 1.30, OAK),
-    *cabinet(0.18, 4.95, 0.34, 1.00, 1.10, OAK),
-    *cabinet(8.84, 1.55, 0.30, 0.60, 0.90, GREY),
-    *stool(1.2, 5.98),
-    *stool(3.6, 5.90),
-    *stool(6.3, 5.95),
-    *stool(1.6, 1.08),
-    *stool(7.2, 1.10),
-]
-BACKGROUND = (*WALLS, *FURNITURE)
-BACKGROUND_BOXES = np.array([part.bounds for part in BACKGROUND])
+# ---- the paper's scenes
 
 
 def empty_scene():
@@ -309,7 +622,7 @@ def empty_scene():
     -------
     Scene
     """
-    return Scene((), np.empty((0, 2)))
+    return Scene()
 
 
 def figure_eight_scene():
@@ -319,7 +632,7 @@ def figure_eight_scene():
     -------
     Scene
     """
-    return Scene(("trash can", "trash can"), [(2.5, 3.6), (6.5, 3.6)])
+    return Scene([Object.trash_can((2.5, 3.6)), Object.trash_can((6.5, 3.6))])
 
 
 def slalom_scene(n_cones=4, spacing=1.5):
@@ -338,16 +651,16 @@ def slalom_scene(n_cones=4, spacing=1.5):
     Raises
     ------
     ValueError
-        If a cone would not stand clear of the others and of the background.
+        If a cone would not stand free of the others and of the background.
 
     Examples
     --------
     >>> np.diff(slalom_scene(3, spacing=1.5).positions, axis=0).tolist()
     [[1.5, 0.0], [1.5, 0.0]]
     """
+    left, _, right, _ = LABORATORY.bounds
     offsets = (np.arange(n_cones) - (n_cones - 1) / 2) * spacing
-    positions = np.column_stack([ROOM[0] / 2 + offsets, np.full(n_cones, 3.6)])
-    return Scene(("cone",) * n_cones, positions)
+    return Scene([Object.cone(((left + right) / 2 + offset, 3.6)) for offset in offsets])
 
 
 def moved(scene, shifts):
@@ -366,7 +679,7 @@ def moved(scene, shifts):
     Raises
     ------
     ValueError
-        If an object does not stand clear there, as for `Scene`.
+        If an object does not stand free there.
 
     Examples
     --------
@@ -374,7 +687,7 @@ def moved(scene, shifts):
     >>> (moved(scene, [(0.5, 0.0), (0.0, -0.5)]).boxes - scene.boxes).round(6).tolist()
     [[0.5, 0.0, 0.5, 0.0], [0.0, -0.5, 0.0, -0.5]]
     """
-    return Scene(scene.kinds, scene.positions + np.asarray(shifts), scene.robot)
+    return scene.with_objects_at(scene.positions + np.asarray(shifts))
 
 
 def rearranged(scene, rng, reach=0.6, spacing=1.0, attempts=10_000):
@@ -403,19 +716,12 @@ def rearranged(scene, rng, reach=0.6, spacing=1.0, attempts=10_000):
     Examples
     --------
     >>> scene = rearranged(figure_eight_scene(), np.random.default_rng(0), spacing=1.2)
-    >>> bool((background_distance(scene.positions) - scene.foot_radii >= 1.2).all())
+    >>> bool((object_gaps(scene) >= 1.2).all())
     True
     """
     for _ in range(attempts):
         positions = scene.positions + rng.normal(0.0, reach, scene.positions.shape)
         if free_room(scene, positions) >= spacing:
-            return Scene(scene.kinds, positions, scene.robot)
-    n_objects = len(scene.kinds)
+            return scene.with_objects_at(positions)
+    n_objects = len(scene.objects)
     raise ValueError(f"spacing must leave room for {n_objects} objects, found none for {spacing} m")
-
-
-def free_room(scene, positions):
-    """Least free distance in m round the scene's objects if they stood at (N, 2) `positions`."""
-    gaps = free_gaps(positions, scene.foot_radii)
-    to_robot = np.linalg.norm(positions - scene.robot[:2], axis=1) - scene.foot_radii
-    return min(gaps.min(initial=np.inf), to_robot.min(initial=np.inf))

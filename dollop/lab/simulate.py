@@ -1,19 +1,21 @@
-"""Recording in the laboratory: a person watched by a standing robot, and a tour for the map."""
+"""Recording in the laboratory: people watched by a robot that stands or drives, and a tour for the map."""
+
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
 from dollop.lab import person
-from dollop.lab.pioneer import Pioneer, laser_pose
-from dollop.lab.recording import TRUTH_COLUMNS, Recording
+from dollop.lab.people import walks_of
+from dollop.lab.pioneer import Pioneer
+from dollop.lab.recording import MOVED_COLUMNS, ROBOT_COLUMNS, TRUTH_COLUMNS, Recording
 from dollop.lab.scenes import empty_scene, figure_eight_scene
-from dollop.lab.sick import SickLMS200
-from dollop.lab.world import World
+from dollop.lab.world import World, object_at
 from dollop.laser import LaserLog
-from dollop.pose import wrapped
+from dollop.pose import moved_pose, wrapped
 from dollop.robot.control import PIONEER_LIMITS
 
-__all__ = ["record", "record_background", "record_figure_eights", "watch"]
+__all__ = ["pursue", "record", "record_background", "record_figure_eights", "record_tour", "watch"]
 
 TOUR = np.transpose(
     [
@@ -21,42 +23,108 @@ TOUR = np.transpose(
         (2.6, 2.3, 3.6, 4.9, 5.1, 4.9, 3.8, 2.2, 1.6, 1.4, 3.6),
     ]
 )
-"""Way-points (K, 2) in m of the drive that shows the laser every side of the background."""
+"""Way-points (K, 2) in m of the drive that shows the laser every side of the paper's laboratory."""
 TOUR_LIMITS = PIONEER_LIMITS._replace(turn=1.75)
 """On that drive the robot may turn as fast as it can: 100 deg/s (Player, p2os)."""
+ARRIVED = 0.3
+"""Distance in m from a way-point at which the next one is driven to."""
 
 
-def record(scene, walk, seed, sick=None, legs=False):
-    """Watch a walk with the laser of the standing robot (Sec. II).
+def record(scene, seed, walks=None, duration=None):
+    """Watch people with the laser of the robot (Sec. II).
+
+    A robot that has somewhere to drive drives there meanwhile; what the log then has of its poses is
+    its odometry, and the true ones are part of the truth.
 
     Parameters
     ----------
     scene : Scene
-    walk : Walk
     seed : int or numpy.random.Generator
-        For the laser's noise.
-    sick : SickLMS200, optional
-        The laser, in its default mode when not given.
-    legs : bool
-        Whether the laser meets two striding legs instead of a torso.
+        For the errors of laser and odometry.
+    walks : sequence of Walk, optional
+        Of the people; the scene's own when not given.
+    duration : float, optional
+        In s; as long as the first walk when not given.
 
     Returns
     -------
     Recording
+
+    Raises
+    ------
+    ValueError
+        If nobody walks and no duration is given, or as `dollop.lab.people.walks_of`.
     """
-    sick, rng = sick or SickLMS200(), np.random.default_rng(seed)
-    t, pose = np.arange(0.0, walk.t[-1], 1 / sick.rate), laser_pose(scene.robot)
-    states = [walk.at(time) for time in t]
-    ranges, rows = [], []
-    with World(scene, legs) as world:
-        for time, (position, heading, phase) in zip(t, states, strict=True):
-            world.place_person(position, heading, phase)
-            ranges.append(sick.scan(world, pose, rng))
-            rows.append((time, *position, wrapped(heading)))
-    return as_recording(t, ranges, sick, rows, scene)
+    walks = walks_of(scene) if walks is None else tuple(walks)
+    if not walks and duration is None:
+        raise ValueError("a recording needs a person who walks, or a duration, got neither")
+    rng, scanner = np.random.default_rng(seed), scene.robot.scanner
+    t = np.arange(0.0, walks[0].t[-1] if duration is None else duration, 1 / scanner.rate)
+    with World(scene, walks) as world:
+        observer = Driving(world, rng) if scene.robot.way else Standing(scene.robot)
+        ranges, poses, true_poses = [], [], []
+        for time in t:
+            world.at(time)
+            poses.append(observer.pose)
+            true_poses.append(observer.true_pose)
+            ranges.append(world.scan(true_poses[-1], rng))
+            observer.go_on()
+    log = LaserLog(t, np.array(ranges), scanner.angles, np.array(poses), scanner.max_range)
+    return Recording(log, truth_of(scene, walks, t, np.array(true_poses)), scene)
 
 
-def watch(scene, seed, duration=6.0, sick=None):
+class Standing:
+    """A robot that stands where it is, and knows it."""
+
+    def __init__(self, robot):
+        self.pose = self.true_pose = robot.laser_pose
+
+    def go_on(self):
+        """Nothing happens."""
+
+
+class Driving:
+    """A Pioneer that drives along its way, and believes its wheels; poses are those of its laser."""
+
+    def __init__(self, world, rng):
+        self._robot = Pioneer(world, world.scene.robot.pose, seed=rng.spawn(1)[0], limits=TOUR_LIMITS)
+        self._told, self._goals = world.scene.robot, list(world.scene.robot.way)
+
+    @property
+    def pose(self):
+        """(3,) where odometry has the laser."""
+        return moved_pose(self._robot.odometry, self._told.laser_ahead, 0.0)
+
+    @property
+    def true_pose(self):
+        """(3,) where the laser is."""
+        return self._robot.laser_pose
+
+    def go_on(self):
+        """Drive for one scan, and stand at the end of the way."""
+        believed = self._robot.odometry
+        while self._goals and np.linalg.norm(self._goals[0] - believed[:2]) < ARRIVED:
+            self._goals.pop(0)
+        command = pursue(believed, self._goals[0], self._told.speed) if self._goals else (0.0, 0.0)
+        self._robot.drive(*command)
+
+
+def truth_of(scene, walks, t, true_poses):
+    """Where everybody and everything that moves was at each scan, as the columns of a Recording's truth."""
+    columns = {"t": t} if walks or scene.moves or scene.robot.way else {}
+    for k, walk in enumerate(walks):
+        x, y, heading = np.transpose([(*walk.at(time)[0], wrapped(walk.at(time)[1])) for time in t])
+        names = TRUTH_COLUMNS[1:] if k == 0 else [f"{name}_{k}" for name in TRUTH_COLUMNS[1:]]
+        columns |= dict(zip(names, (x, y, heading), strict=True))
+    for k in sorted({move.object for move in scene.moves}):
+        places = np.transpose([object_at(scene, k, time) for time in t])
+        columns |= dict(zip((f"{name}_{k}" for name in MOVED_COLUMNS), places, strict=True))
+    if scene.robot.way:
+        columns |= dict(zip(ROBOT_COLUMNS, true_poses.T, strict=True))
+    return pd.DataFrame(columns or {name: [] for name in TRUTH_COLUMNS}, dtype=float)
+
+
+def watch(scene, seed, duration=6.0):
     """What the standing robot's laser sees of a scene in which nobody walks (Sec. IV).
 
     Parameters
@@ -66,28 +134,16 @@ def watch(scene, seed, duration=6.0, sick=None):
         For the laser's noise.
     duration : float
         s.
-    sick : SickLMS200, optional
 
     Returns
     -------
     Recording
         Its truth has no rows.
     """
-    sick, rng = sick or SickLMS200(), np.random.default_rng(seed)
-    t, pose = np.arange(0.0, duration, 1 / sick.rate), laser_pose(scene.robot)
-    with World(scene) as world:
-        ranges = [sick.scan(world, pose, rng) for _ in t]
-    return as_recording(t, ranges, sick, [], scene)
+    return record(scene, seed, (), duration)
 
 
-def as_recording(t, ranges, sick, rows, scene):
-    """The scans (T, B) of the standing robot and the rows of the truth, as a Recording."""
-    poses = np.tile(laser_pose(scene.robot), (len(t), 1))
-    log = LaserLog(t, np.array(ranges), sick.angles, poses, sick.max_range)
-    return Recording(log, pd.DataFrame(rows, columns=TRUTH_COLUMNS), scene)
-
-
-def record_figure_eights(seed, laps=5, scene=None, sick=None, legs=False, **gait):
+def record_figure_eights(seed, laps=5, scene=None, scanner=None, **gait):
     """Figure-eights round two trash cans, seen by the laser (Fig. 6a).
 
     A `record` of a `figure_eight`.
@@ -98,9 +154,8 @@ def record_figure_eights(seed, laps=5, scene=None, sick=None, legs=False, **gait
     laps : int
     scene : Scene, optional
         `figure_eight_scene()` when not given.
-    sick : SickLMS200, optional
-    legs : bool
-        As for `record`.
+    scanner : Scanner, optional
+        In place of the scene's own.
     **gait
         Keywords of `figure_eight` and `walk`.
 
@@ -109,12 +164,13 @@ def record_figure_eights(seed, laps=5, scene=None, sick=None, legs=False, **gait
     Recording
     """
     scene = scene or figure_eight_scene()
+    if scanner is not None:
+        scene = replace(scene, robot=replace(scene.robot, scanner=scanner))
     walking, sensing = np.random.default_rng(seed).spawn(2)
-    walk = person.figure_eight(scene, walking, laps, **gait)
-    return record(scene, walk, sensing, sick, legs)
+    return record(scene, sensing, [person.figure_eight(scene, walking, laps, **gait)])
 
 
-def record_background(seed, sick=None):
+def record_background(seed, scanner=None, scene=None, tour=TOUR):
     """Drive through the empty laboratory and log the laser with true poses, for a map (Sec. II).
 
     The paper's robot mapped its laboratory by CARMEN; here the poses are known.
@@ -123,28 +179,86 @@ def record_background(seed, sick=None):
     ----------
     seed : int or numpy.random.Generator
         For the laser's noise.
-    sick : SickLMS200, optional
+    scanner : Scanner, optional
+        In place of the scene's own.
+    scene : Scene, optional
+        Of another room.
+    tour : (K, 2) array_like, optional
+        Way-points in m; those of the paper's laboratory when not given.
 
     Returns
     -------
     LaserLog
     """
-    sick, rng = sick or SickLMS200(), np.random.default_rng(seed)
-    scene = empty_scene()
+    scene, rng = scene or empty_scene(), np.random.default_rng(seed)
+    scanner = scanner or scene.robot.scanner
     poses, ranges = [], []
     with World(scene) as world:
-        robot = Pioneer(world, scene.robot, limits=TOUR_LIMITS, sick=sick)
-        for goal in TOUR:
-            while np.linalg.norm(goal - robot.pose[:2]) > 0.3:
-                poses.append(laser_pose(robot.pose))
-                ranges.append(sick.scan(world, poses[-1], rng))
+        robot = Pioneer(world, scene.robot.pose, limits=TOUR_LIMITS, scanner=scanner)
+        for goal in tour:
+            while np.linalg.norm(goal - robot.pose[:2]) > ARRIVED:
+                poses.append(robot.laser_pose)
+                ranges.append(world.scan(poses[-1], rng, scanner))
                 robot.drive(*pursue(robot.pose, goal))
-    t = np.arange(len(poses)) / sick.rate
-    return LaserLog(t, np.array(ranges), sick.angles, np.array(poses), sick.max_range)
+    t = np.arange(len(poses)) / scanner.rate
+    return LaserLog(t, np.array(ranges), scanner.angles, np.array(poses), scanner.max_range)
+
+
+def record_tour(scene, places, seed, stride=0.15, turns=12):
+    """Scans along a way through a scene, the laser turned once round at every place, with true poses.
+
+    For a map of any room, where `record_background` drives through the paper's; how the robot got
+    from pose to pose is left out, as it is from a log that has been thinned.
+
+    Parameters
+    ----------
+    scene : Scene
+    places : (K, 2) array_like
+        In m; straight lines between them are driven.
+    seed : int or numpy.random.Generator
+        For the laser's noise.
+    stride : float
+        Distance in m between scans on the way.
+    turns : int
+        Scans at every place.
+
+    Returns
+    -------
+    LaserLog
+    """
+    rng, scanner = np.random.default_rng(seed), scene.robot.scanner
+    places = np.asarray(places, dtype=float)
+    poses = [(*places[0], theta) for theta in np.arange(turns) * 2 * np.pi / turns]
+    for begin, end in zip(places[:-1], places[1:], strict=True):
+        heading = np.arctan2(*(end - begin)[::-1])
+        count = max(1, round(np.linalg.norm(end - begin) / stride))
+        poses += [(*(begin + share * (end - begin)), heading) for share in np.arange(1, count) / count]
+        poses += [(*end, heading + theta) for theta in np.arange(turns) * 2 * np.pi / turns]
+    with World(scene) as world:
+        ranges = [world.scan(pose, rng) for pose in poses]
+    t = np.arange(len(poses)) / scanner.rate
+    return LaserLog(t, np.array(ranges), scanner.angles, np.array(poses), scanner.max_range)
 
 
 def pursue(pose, goal, speed=0.5, gain=1.5):
-    """Speed in m/s and turning rate in rad/s towards a goal (2,), slower where it is aside."""
+    """Speed and turning rate towards a goal, slower where it is aside.
+
+    Parameters
+    ----------
+    pose : (3,) sequence of float
+        x, y in m, theta in rad.
+    goal : (2,) sequence of float
+        In m.
+    speed : float
+        In m/s.
+    gain : float
+        Turning rate in rad/s per rad of error.
+
+    Returns
+    -------
+    speed, turn : float
+        In m/s and rad/s.
+    """
     x, y, theta = pose
     error = wrapped(np.arctan2(goal[1] - y, goal[0] - x) - theta)
     return speed * max(np.cos(error), 0.0) ** 2, gain * error

@@ -1,203 +1,180 @@
-"""The laboratory as a PyBullet world: background, objects and a person, for rays and wheels."""
+"""A scene in the simulator, for beams and wheels: background, objects and people."""
 
 import numpy as np
-import pybullet
 
-from dollop.lab.person import DEPTH, SHOULDERS, STRIDE_RATE
-from dollop.lab.scenes import BACKGROUND, BEAM_HEIGHT, KINDS
+from dollop.lab.engine import Engine, Solid
+from dollop.lab.person import DEPTH, LEG_RADIUS, SHOULDERS, body_offsets
 from dollop.pose import rotation
 
-__all__ = ["PHYSICS_RATE", "Server", "World", "body_offsets"]
+__all__ = ["World", "object_at"]
 
-PHYSICS_RATE = 240
-"""Steps of physics per second, as PyBullet recommends."""
-COMPOUND = 16
-"""Parts of a compound shape: PyBullet silently leaves out what is beyond that."""
-LEG_RADIUS = 0.055
-LEG_SPREAD = 0.09
 AWAY = (0.0, 0.0, -10.0)
+HULL = 0.24
+"""m: up to here a robot's hull touches things."""
+LYING = (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5))
 
 
-class Server:
-    """A PyBullet server of its own, without a window; to be used in a `with` statement.
+class World:
+    """A laboratory with floor, background, foreground objects and people (Sec. II).
+
+    To be used in a `with` statement. People are out of the way until `at` is called.
+
+    Parameters
+    ----------
+    scene : Scene
+    walks : sequence of Walk
+        Of the people in it.
 
     Attributes
     ----------
-    client : int
-        By which PyBullet knows it.
+    scene : Scene
+    engine : Engine
+        The simulator.
+    floor : int
+        The body of the floor.
     """
 
-    def __init__(self):
-        self.client = pybullet.connect(pybullet.DIRECT)
-
-    def call(self, function, *arguments, **keywords):
-        """Call a function of PyBullet on this server.
-
-        Parameters
-        ----------
-        function : str
-            Its name.
-        *arguments, **keywords
-            What it takes.
-
-        Returns
-        -------
-        object
-            What it returns.
-        """
-        return getattr(pybullet, function)(*arguments, physicsClientId=self.client, **keywords)
+    def __init__(self, scene, walks=()):
+        self.scene, self.walks, self.engine = scene, tuple(walks), Engine()
+        height = scene.robot.beam_height
+        self.floor = self.engine.add_floor()
+        self.engine.add([solid_of_part(part, height) for part in scene.room.parts])
+        self._objects = [self._add_object(each, height) for each in scene.objects]
+        self._people = [[self.engine.add([limb], AWAY) for limb in limbs(walk.body)] for walk in self.walks]
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
-        pybullet.disconnect(self.client)
+        self.engine.__exit__()
+
+    def _add_object(self, each, height):
+        return self.engine.add(solids_of_object(each, height), (*each.position, 0.0))
+
+    def at(self, t):
+        """Put people and moved objects where they are at a time.
+
+        Parameters
+        ----------
+        t : float
+            In s.
+        """
+        height = self.scene.robot.beam_height
+        for walk, bodies in zip(self.walks, self._people, strict=True):
+            position, heading, phase = walk.at(t)
+            for body, offset in zip(bodies, body_offsets(walk.body, phase), strict=True):
+                self.engine.place(body, (*(position + rotation(heading) @ offset), height), heading)
+        for k in {move.object for move in self.scene.moves}:
+            self.engine.place(self._objects[k], (*object_at(self.scene, k, t), 0.0))
+
+    def cast(self, pose, angles, reach):
+        """True distance along each beam of a laser.
+
+        Parameters
+        ----------
+        pose : (3,) sequence of float
+            Of the laser: x, y in m, theta in rad.
+        angles : (B,) array
+            Bearings in rad in the laser's frame.
+        reach : float
+            Length of the beams in m.
+
+        Returns
+        -------
+        (B,) float array
+            Metres, `inf` where a beam meets nothing.
+        """
+        x, y, theta = pose
+        bearings = angles + theta
+        directions = np.column_stack([np.cos(bearings), np.sin(bearings), np.zeros(len(angles))])
+        return self.engine.cast(np.array([x, y, self.scene.robot.beam_height]), directions, reach)
+
+    def scan(self, pose, rng, scanner=None):
+        """What a laser reports from a place in the laboratory.
+
+        Parameters
+        ----------
+        pose : (3,) sequence of float
+            Of the laser: x, y in m, theta in rad.
+        rng : numpy.random.Generator
+        scanner : Scanner, optional
+            The robot's own when not given.
+
+        Returns
+        -------
+        (B,) float array
+            Ranges in m, `inf` where nothing came back.
+        """
+        scanner = scanner or self.scene.robot.scanner
+        return scanner.report(self.cast(pose, scanner.angles, scanner.max_range), rng)
 
 
-class World(Server):
-    """A laboratory with floor, background, foreground objects and a person (Sec. II).
-
-    To be used in a `with` statement. The person is out of the way until it is placed.
+def object_at(scene, k, t):
+    """Where an object stands at a time, moved or not.
 
     Parameters
     ----------
     scene : Scene
-        The movable foreground objects.
-    legs : bool
-        Whether a person shows the laser two striding legs instead of a torso.
-
-    Attributes
-    ----------
-    floor : int
-        PyBullet body of the floor.
-    """
-
-    def __init__(self, scene, legs=False):
-        super().__init__()
-        self.legs = legs
-        self.call("setGravity", 0, 0, -9.81)
-        self.call("setTimeStep", 1 / PHYSICS_RATE)
-        self.floor = self.fixed_body(self.call("createCollisionShape", pybullet.GEOM_PLANE))
-        for start in range(0, len(BACKGROUND), COMPOUND):
-            self.fixed_body(compound(self, BACKGROUND[start : start + COMPOUND]))
-        for kind, position in zip(scene.kinds, scene.positions, strict=True):
-            add_object(self, KINDS[kind], position)
-        self.person = (leg(self), leg(self)) if legs else (torso(self),)
-        self.remove_person()
-
-    def fixed_body(self, shape, position=(0.0, 0.0, 0.0)):
-        """Make a body that never moves by itself.
-
-        Parameters
-        ----------
-        shape : int
-            Collision shape of PyBullet's.
-        position : (3,) sequence of float
-            x, y, z in m.
-
-        Returns
-        -------
-        int
-            PyBullet body.
-        """
-        return self.call("createMultiBody", 0, shape, -1, position)
-
-    def place_person(self, position, heading, phase=0.0):
-        """Put the person somewhere.
-
-        Parameters
-        ----------
-        position : (2,) float array
-            Middle of the body in m.
-        heading : float
-            Direction the chest points in, in rad.
-        phase : float
-            Phase of the gait in rad.
-        """
-        upright = (0.0, 0.0, np.sin(heading / 2), np.cos(heading / 2))
-        for body, offset in zip(self.person, body_offsets(self.legs, phase), strict=True):
-            x, y = position + rotation(heading) @ offset
-            self.call("resetBasePositionAndOrientation", body, (x, y, BEAM_HEIGHT), upright)
-
-    def remove_person(self):
-        """Take the person out of the laser's way."""
-        for body in self.person:
-            self.call("resetBasePositionAndOrientation", body, AWAY, (0.0, 0.0, 0.0, 1.0))
-
-
-def compound(world, parts):
-    """One collision shape of up to 16 parts: rays are faster than through a body for each.
-
-    Upright cylinders become capsules, flat ones boxes: a ray meets either ten times faster than
-    PyBullet's cylinder. A capsule adds its two round ends to its length.
-    """
-    sizes = np.array([part.size for part in parts])
-    round_ones = np.array([part.shape == "cylinder" for part in parts])
-    capsules = round_ones & (sizes[:, 2] > sizes[:, 0])
-    return world.call(
-        "createCollisionShapeArray",
-        shapeTypes=np.where(capsules, pybullet.GEOM_CAPSULE, pybullet.GEOM_BOX).tolist(),
-        halfExtents=(sizes / 2).tolist(),
-        radii=(sizes[:, 0] / 2).tolist(),
-        lengths=(sizes[:, 2] - sizes[:, 0]).tolist(),
-        collisionFramePositions=[part.centre for part in parts],
-    )
-
-
-def add_object(world, kind, position):
-    """A foreground object: an upright capsule, as round as it is at the beam, on a square foot."""
-    foot = max(kind.foot_radius, kind.beam_radius) / np.sqrt(2)
-    length = kind.height - kind.beam_radius
-    shape = world.call(
-        "createCollisionShapeArray",
-        shapeTypes=[pybullet.GEOM_CAPSULE, pybullet.GEOM_BOX],
-        radii=[kind.beam_radius, 0.0],
-        lengths=[length, 0.0],
-        halfExtents=[[0.0, 0.0, 0.0], [foot, foot, 0.03]],
-        collisionFramePositions=[[0.0, 0.0, length / 2], [0.0, 0.0, 0.03]],
-    )
-    return world.fixed_body(shape, (*position, 0.0))
-
-
-def torso(world):
-    """A capsule lying across the shoulders at the height of the laser, which sees a stadium."""
-    lying = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
-    size = {"radius": DEPTH / 2, "height": SHOULDERS - DEPTH, "collisionFrameOrientation": lying}
-    return world.fixed_body(world.call("createCollisionShape", pybullet.GEOM_CAPSULE, **size))
-
-
-def leg(world):
-    """An upright capsule as thick as a leg is at the height of the laser."""
-    size = {"radius": LEG_RADIUS, "height": 0.4}
-    return world.fixed_body(world.call("createCollisionShape", pybullet.GEOM_CAPSULE, **size))
-
-
-def body_offsets(legs, phase):
-    """Where torso or legs are, seen from the middle of the body.
-
-    The legs swing with an amplitude at which a foot would stand still on the floor in mid-stance at
-    1 m/s; a reconstruction.
-
-    Parameters
-    ----------
-    legs : bool
-        Whether there are two legs instead of a torso.
-    phase : float
-        Phase of the gait in rad.
+    k : int
+        Which object.
+    t : float
+        In s.
 
     Returns
     -------
-    (1, 2) or (2, 2) float array
-        Ahead and to the left in m.
-
-    Examples
-    --------
-    The body stays in the middle of its legs.
-
-    >>> body_offsets(True, phase=1.0).mean(axis=0).tolist()
-    [0.0, 0.0]
+    (2,) float array
+        In m.
     """
-    if not legs:
-        return np.zeros((1, 2))
-    stride = np.sin(phase) / (2 * np.pi * STRIDE_RATE)
-    return np.array([[stride, LEG_SPREAD], [-stride, -LEG_SPREAD]])
+    place = np.array(scene.objects[k].position)
+    for move in sorted(scene.moves, key=lambda each: each.begin):
+        if move.object == k:
+            place = place + np.clip((t - move.begin) / move.seconds, 0.0, 1.0) * (np.array(move.to) - place)
+    return place
+
+
+def solid_of_part(part, beam_height):
+    """Furniture as beams meet it ten times faster than PyBullet's cylinder: capsules, flat ones boxes.
+
+    A capsule adds its two round ends to its length; where the beam would meet one of them the
+    cylinder stays.
+    """
+    width, depth, height = part.size
+    half_turn = part.turn / 2
+    turn = (0.0, 0.0, float(np.sin(half_turn)), float(np.cos(half_turn)))
+    if part.shape == "box" or height <= width:
+        flat = part.shape == "cylinder" and part.reaches(beam_height)
+        return Solid("cylinder" if flat else "box", part.size, part.centre, turn)
+    straight = abs(beam_height - part.centre[2]) <= (height - width) / 2
+    if straight or not part.reaches(beam_height):
+        return Solid("capsule", (width, depth, height - width), part.centre)
+    return Solid("cylinder", part.size, part.centre)
+
+
+def solids_of_object(each, beam_height):
+    """A foreground object, round at its position: as it is at the beam, and as wide below as it is there.
+
+    What is round is an upright capsule, straight from the floor to the beam, on a square foot.
+    """
+    outline = each.outline(beam_height)
+    if each.shape == "box":
+        width, depth = each.size
+        half_turn = each.turn / 2
+        turn = (0.0, 0.0, float(np.sin(half_turn)), float(np.cos(half_turn)))
+        return [Solid("box", (width, depth, each.height), (0.0, 0.0, each.height / 2), turn)]
+    below = min(HULL, each.height, 0.9 * beam_height)
+    skirt = Solid("cylinder", (each.size[0], each.size[0], below), (0.0, 0.0, below / 2))
+    if outline is None:
+        return [skirt]
+    radius = outline.radius
+    length = max(each.height - radius, beam_height)
+    side = np.sqrt(2) * max(each.reach, radius)
+    foot = Solid("box", (side, side, 0.06), (0.0, 0.0, 0.03))
+    trunk = Solid("capsule", (2 * radius, 2 * radius, length), (0.0, 0.0, length / 2))
+    return [trunk, foot] if each.foot or each.shape == "cylinder" else [trunk, skirt]
+
+
+def limbs(body):
+    """What a person shows the laser: a stadium across the shoulders, or two upright legs."""
+    if body == "torso":
+        return [Solid("capsule", (DEPTH, DEPTH, SHOULDERS - DEPTH), (0.0, 0.0, 0.0), LYING)]
+    return 2 * [Solid("capsule", (2 * LEG_RADIUS, 2 * LEG_RADIUS, 0.4), (0.0, 0.0, 0.0))]

@@ -25,7 +25,7 @@ from dollop.task import Demonstration, Task, learn
 from dollop.trajectory import arc_length, at_arc_length
 
 __all__ = [
-    "LAYOUTS", "SEED", "adapted_task", "background_map", "eight_runs", "empty_lab",
+    "KEPT", "LAYOUTS", "SEED", "adapted_task", "background_map", "eight_runs", "empty_lab",
     "figure_eights",
     "kidnapped_runs", "largest_corner", "matched_right", "matchings_from_laser",
     "moved_environment", "moved_runs", "moved_scene", "nearest", "new_slalom_task",
@@ -38,6 +38,10 @@ SEED = 2004
 
 LAYOUTS = ((0.1, 0.4), (0.0, -0.7)), ((0.9, -0.4), (-0.7, -0.4)), ((-0.4, -0.6), (0.4, 0.3))
 """How far each can is moved in m along x and y, in three ways (Fig. 10)."""
+
+KEPT = {"from_background": 0.30}
+"""Walks of the figures and claims keep so far from the background, in m, shoulder to wall: the radius
+of Sec. II swallows what is nearer. A layout without room for that is drawn anew."""
 
 
 def save_all(folder):
@@ -143,7 +147,7 @@ def figure_eights(seed=SEED):
     -------
     FigureEights
     """
-    return FigureEights(lab.record_figure_eights(seed))
+    return FigureEights(lab.record_figure_eights(seed, **KEPT))
 
 
 @cache
@@ -397,7 +401,7 @@ class Slalom:
 
     @cached_property
     def recording(self):
-        return lab.record(self.scene, self.walk, self.noise)
+        return lab.record(self.scene, self.noise, [self.walk])
 
     @cached_property
     def demonstration(self):
@@ -427,7 +431,7 @@ def slalom(k, seed=SEED):
     for _ in range(100):
         try:
             scene = lab.rearranged(lab.slalom_scene(), rng, reach=0.25, spacing=0.6)
-            return Slalom(scene, lab.slalom(scene, rng), [seed, 11, k])
+            return Slalom(scene, lab.slalom(scene, rng, **KEPT), [seed, 11, k])
         except ValueError:  # no room to walk among these
             continue
     raise RuntimeError("no layout with room for a slalom in 100 draws")

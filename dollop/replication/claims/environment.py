@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from dollop.environment import corner_indices, integer_costs
 from dollop.lab.drawn import random_layouts
 from dollop.lab.person import figure_eight
-from dollop.lab.scenes import Scene, figure_eight_scene, rearranged
+from dollop.lab.scenes import figure_eight_scene, object_gaps, rearranged
 from dollop.matching import match
 from dollop.observation import observe
 from dollop.replication import recordings
@@ -251,8 +251,10 @@ def one_can_moved(seed):
         positions = figure_eight_scene().positions.copy()
         positions[rng.integers(2)] += rng.normal(0, 0.4, 2)
         try:
-            scene = Scene(figure_eight_scene().kinds, positions)
-            walks = [figure_eight(scene, rng, laps=1).positions[::5] for _ in range(3)]
+            scene = figure_eight_scene().with_objects_at(positions)
+            if object_gaps(scene).min() < 0.45:
+                continue
+            walks = [figure_eight(scene, rng, laps=1, **recordings.KEPT).positions[::5] for _ in range(3)]
         except ValueError:  # no room to walk round this one
             continue
         look = observe(watch(scene, [seed, 17]).log, recordings.background_map())

@@ -133,7 +133,7 @@ def walked_seen_ideally(seed):
     """As `walked`, seen by a laser without noise or mixed pixels."""
     from dollop.lab import SickLMS200, record_figure_eights
 
-    recording = record_figure_eights(seed, sick=SickLMS200(noise=0.0, mixed=0.0))
+    recording = record_figure_eights(seed, scanner=SickLMS200(noise=0.0, mixed=0.0))
     return observe(recording.log, recordings.background_map()).user, recording
 
 
@@ -529,7 +529,7 @@ def with_stroller(recording, seed):
     from dollop.lab import record
 
     rng = np.random.default_rng([seed, 14])
-    second = record(recording.scene, stroll(recording.scene, rng), rng).log
+    second = record(recording.scene, rng, [stroll(recording.scene, rng)]).log
     first, n = recording.log, len(recording.log.t)
     nearer = second.ranges[:n] < first.ranges - 0.1  # less is noise
     ranges = np.where(nearer, second.ranges[:n], first.ranges)

@@ -129,7 +129,7 @@ def figure_10a():
     dotted = {"linestyle": ":", "linewidth": 1.5}
     grey = {"color": plot.BACKGROUND, "markeredgewidth": 1.5, "label": "subgoals before"}
     for k, ax in enumerate(axes):
-        adapted, robot = recordings.adapted_task(k), recordings.moved_scene(k).robot
+        adapted, robot = recordings.adapted_task(k), recordings.moved_scene(k).robot.pose
         plot.workspace(grid, robot, adapted.environment.boxes, ax, f"layout {k + 1}")
         plot.boxes(ax, task.environment.boxes, "obstacles before", plot.BACKGROUND, **dotted)
         plot.law(ax, adapted.law.response())

@@ -122,7 +122,7 @@ def draw_demonstration(k):
     """A demonstration as the laser saw it, and what it is made of."""
     scene, shown = recordings.slalom(k).scene, recordings.slalom(k).demonstration
     figure, ax = plt.subplots(figsize=SIZE)
-    plot.workspace(recordings.background_map(), scene.robot, shown.environment.boxes, ax)
+    plot.workspace(recordings.background_map(), scene.robot.pose, shown.environment.boxes, ax)
     (walk,) = shown.trajectory
     plot.law(ax, shown.law.response(), linewidth=4, alpha=0.6)
     plot.path(ax, walk, "user's track", linewidth=1)
