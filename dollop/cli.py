@@ -94,10 +94,13 @@ def _parser():
     add("--out", default="user.csv", help="the trajectory (default: user.csv); a .png lands beside it")
     add = command(_data, "data", "remake the recordings that the notebooks read")
     add("--folder", type=Path, default=Path("data"), help="where to write (default: data)")
-    add = command(_study, "study", "test the paper's claims over many seeds")
-    add("ids", nargs="*", metavar="claim", help="which (default: all); an unknown one lists them")
-    add("--seeds", type=int, help="how many (default: 100)")
-    add("--quick", action="store_true", help="3 seeds, for a look")
+    add = command(_study, "study", "test the paper's claims over many seeds, or the whole chain in random worlds")
+    add(
+        "ids", nargs="*", metavar="claim", help="which (default: all); an unknown one lists them; worlds: random worlds"
+    )
+    add("--seeds", type=int, help="how many (default: 100; 300 worlds)")
+    add("--first-seed", type=int, default=0, metavar="N", help="of the worlds (default: 0)")
+    add("--quick", action="store_true", help="3 seeds, or 11 worlds, for a look")
     add("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     add("--folder", type=Path, help="for the table (default: study; study-quick with --quick)")
     return root, tuple(commands.choices)
@@ -200,7 +203,7 @@ def _data(options):
 
 
 def _study(options):
-    """dollop study [CLAIM ...]"""
+    """dollop study [CLAIM ...], or dollop study worlds"""
     replication("study").command(options)
 
 

@@ -6,35 +6,25 @@ table come claims.json, and with it the table of claims in REPLICATION.md; and s
 the numbers of one seed that any machine must find again.
 """
 
-import json
-import sys
-from contextlib import contextmanager
 from functools import partial
 from math import isfinite, nan
 from pathlib import Path
 
-import joblib
 import numpy as np
 import pandas as pd
 from scipy import stats
-from tqdm import tqdm
 
 from dollop.extras import need
 from dollop.formats.files import FormatError, check_writable, whole_file
 from dollop.replication.claims import CLAIMS
 from dollop.replication.claims.observing import choose_noises
+from dollop.replication.running import as_json, put_between_marks, report_beside, run_all
+from dollop.replication.worlds.survey import command as survey_worlds
 
 __all__ = ["command"]
 
 COLUMNS = ["claim", "seed", "number", "value"]
 SEEDS, QUICK_SEEDS = 100, 3
-ATTEMPTS = 3
-"""How often in a row workers may die without a seed being finished before the study gives up."""
-
-PATIENCE = 300.0
-"""On a cluster, after so many s without a seed finished a worker counts as dead: joblib's Dask
-backend is silent.
-"""
 
 GOLDEN = {"seed": 0, "tolerance": 0.01}
 """The seed whose numbers any machine must find again, and within what: a share of a number's
@@ -42,8 +32,6 @@ standard deviation over the seeds. What differs between processors is far below 
 AVX and another kernel of the linear algebra left all six digits of the table as they were); a walk
 drawn anew is far above it, for fewer than one in a hundred would come that near by chance.
 """
-
-BEGIN, END = "<!-- claims: begin -->", "<!-- claims: end -->"
 
 
 # ---- running
@@ -107,52 +95,19 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
     RuntimeError
         If experiments failed, or workers kept dying; all that was finished is in the table.
     """
-    table, failures, deaths = read_table(table_path), [], 0
-    todo = missing(table, claims, ids, seeds)
-    look = {"desc": "study", "unit": "seed", "file": sys.stderr}
-    bar = tqdm(total=len(todo), disable=not todo, **look)
-    with bar, workers(scheduler, jobs) as done:
-        while todo:
-            try:
-                calls = [joblib.delayed(work)(*job, claims) for job in todo.items()]
-                for seed, rows, failed in done(calls):
-                    table = pd.concat([table, as_table(rows)])
-                    table = table.drop_duplicates(COLUMNS[:3], keep="last")
-                    write_table(table, table_path)
-                    failures, deaths = failures + failed, 0
-                    del todo[seed]
-                    bar.update()
-            except Exception as error:
-                deaths += 1
-                give_up_or_tell(error, deaths, todo)
+    table, failures = read_table(table_path), []
+
+    def keep(found):
+        nonlocal table
+        _, rows, failed = found
+        table = pd.concat([table, as_table(rows)]).drop_duplicates(COLUMNS[:3], keep="last")
+        write_table(table, table_path)
+        failures.extend(failed)
+
+    run_all(missing(table, claims, ids, seeds), partial(work, claims=claims), keep, scheduler, jobs)
     if failures:
         raise RuntimeError(f"{len(failures)} experiments failed: {'; '.join(failures)}")
     return table
-
-
-def give_up_or_tell(error, deaths, todo):
-    """Raise what is no worker's death, or one death too many; tell of any other."""
-    kinds = {kind.__name__ for kind in type(error).__mro__}
-    if kinds.isdisjoint(("BrokenProcessPool", "KilledWorker", "TimeoutError")):
-        raise error
-    tqdm.write(f"a worker died ({type(error).__name__}); {len(todo)} seeds are left", sys.stderr)
-    if deaths == ATTEMPTS:
-        told = f"workers died {ATTEMPTS} times in a row over the seeds {list(todo)}"
-        raise RuntimeError(f"{told}; what was done is kept") from error
-
-
-@contextmanager
-def workers(scheduler=None, jobs=-1):
-    """What runs calls and yields results as they come: processes here, or on a Dask cluster."""
-    parallel = partial(joblib.Parallel, jobs, return_as="generator_unordered", batch_size=1)
-    if scheduler is None:
-        yield parallel()
-        return
-    need("cluster")
-    from distributed import Client
-
-    with Client(scheduler), joblib.parallel_config("dask"):
-        yield parallel(timeout=PATIENCE)
 
 
 def missing(table, claims, ids, seeds):
@@ -342,14 +297,6 @@ def wish(wanted):
     return f"< {high:g}" if low is None else f"{low:g} to {high:g}"
 
 
-def put_between_marks(text, content):
-    """The text with what stands between the marks replaced."""
-    if text.count(BEGIN) != 1 or text.count(END) != 1:
-        raise ValueError(f"the report must hold {BEGIN} and {END} once each")
-    before, rest = text.split(BEGIN)
-    return f"{before}{BEGIN}\n{content}\n{END}{rest.split(END)[1]}"
-
-
 # ---- the command
 
 
@@ -359,8 +306,8 @@ def command(options):
     Parameters
     ----------
     options : argparse.Namespace
-        ids (all claims if empty), seeds (None for the usual number), quick, folder (None for the
-        usual one), scheduler.
+        ids (all claims if empty, or "worlds"), seeds (None for the usual number), first_seed, quick,
+        folder (None for the usual one), scheduler.
 
     Raises
     ------
@@ -373,9 +320,16 @@ def command(options):
     OSError
         If the folder cannot be written to.
     """
+    if "worlds" in options.ids:
+        if options.ids != ["worlds"]:
+            raise ValueError(f"worlds is a study of its own, got {' '.join(options.ids)}")
+        survey_worlds(options)
+        return
+    if options.first_seed:
+        raise ValueError(f"the claims are tested from seed 0 on, got --first-seed {options.first_seed}")
     unknown = [id for id in options.ids if id not in CLAIMS]
     if unknown:
-        raise ValueError(f"no claim {', '.join(unknown)}; known: {', '.join(CLAIMS)}")
+        raise ValueError(f"no claim {', '.join(unknown)}; known: {', '.join(CLAIMS)}; or worlds")
     seeds = (QUICK_SEEDS if options.quick else SEEDS) if options.seeds is None else options.seeds
     if seeds < 2:
         raise ValueError(f"an interval needs at least 2 seeds, got {seeds}")
@@ -396,12 +350,6 @@ def command(options):
     publish(table, folder)
 
 
-def report_beside(folder):
-    """REPLICATION.md if the folder is that of the replication's own study beside it, else None."""
-    path = folder.parent / "REPLICATION.md"
-    return path if folder.name == "study" and path.exists() else None
-
-
 def publish(table, folder):
     """Write claims.json into the folder; beside REPLICATION.md if the study is the one told there.
 
@@ -412,14 +360,9 @@ def publish(table, folder):
         print(f"{claim['id']:17}{claim['verdict']:15}{claim['seeds']:4} seeds")
     written = {(folder.parent if report else folder) / "claims.json": as_json(found)}
     if report:
-        written[report] = put_between_marks(report.read_text(), claims_table(found))
+        written[report] = put_between_marks(report.read_text(), "claims", claims_table(found))
         written[folder / "golden.json"] = as_json(golden_numbers(table))
     for path, text in written.items():
         with whole_file(path, "w") as stream:
             stream.write(text)
     print(f"wrote {', '.join(map(str, [folder / 'results.csv', *written]))}")
-
-
-def as_json(content):
-    """Content as JSON, a line per entry."""
-    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"

@@ -12,7 +12,7 @@ import pytest
 from dollop.cli import main
 from dollop.extras import EXTRAS
 from dollop.formats.files import FormatError
-from dollop.replication import study
+from dollop.replication import running, study
 from dollop.replication.claims import (
     Claim,
     Criterion,
@@ -164,8 +164,8 @@ def test_a_dask_cluster_gives_the_same_numbers(tmp_path):
 def test_a_dask_worker_that_dies_for_good_ends_the_study(tmp_path, runs, monkeypatch, capsys):
     """The study does not wait for what a cluster has given up; the other seeds are kept."""
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
-    monkeypatch.setattr(study, "PATIENCE", 3.0)
-    monkeypatch.setattr(study, "ATTEMPTS", 1)
+    monkeypatch.setattr(running, "PATIENCE", 3.0)
+    monkeypatch.setattr(running, "ATTEMPTS", 1)
     path = tmp_path / "results.csv"
     with (
         cluster_of_two(distributed) as cluster,
@@ -276,10 +276,10 @@ def test_a_criterion_is_met_only_by_the_whole_interval():
 
 def test_only_what_stands_between_the_marks_is_replaced():
     """The report's own words stay; a report without marks is refused."""
-    text = f"before\n{study.BEGIN}\nold\n{study.END}\nafter\n"
-    assert study.put_between_marks(text, "new") == text.replace("old", "new")
+    text = "before\n<!-- claims: begin -->\nold\n<!-- claims: end -->\nafter\n"
+    assert running.put_between_marks(text, "claims", "new") == text.replace("old", "new")
     with pytest.raises(ValueError, match="once each"):
-        study.put_between_marks("no marks", "new")
+        running.put_between_marks("no marks", "claims", "new")
 
 
 # ---- the experiments' own measures
@@ -449,7 +449,7 @@ def test_noise_is_chosen_anew_with_the_study_itself(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "run_study", lambda *_: study.as_table())
     chosen = []
     monkeypatch.setattr(study, "choose_noises", lambda: chosen.append(1))
-    marks = f"{study.BEGIN}\n{study.END}\n"
+    marks = "<!-- claims: begin -->\n<!-- claims: end -->\n"
     for folder, report, table, times in (
         ("study", True, False, 1),
         ("study", True, True, 0),

@@ -1,0 +1,575 @@
+"""Random worlds: a seed gives a room, what stands in it, who walks where, and what else happens.
+
+The distribution, in the order in which it is drawn (U: uniform, N: normal):
+
+- kind: `KINDS[seed % len(KINDS)]`, so that any run of seeds has as many of each.
+- room: a rectangle (0.45) of U(4, 15) m by U(4, 12) m, an L of one (0.2), a corridor (0.15) of
+  U(8, 15) m by U(2.4, 3.4) m, or two rooms with a door of U(0.9, 1.3) m (0.2); turned by U(0, 2 pi) in
+  half of the cases; anywhere within 20 m of the origin.
+- furniture: up to one piece in 8 m^2, six at most: cabinets and shelves at a wall, tables, columns; all
+  of it cut by the laser.
+- laser: an LMS 200 in mm (0.35) or cm (0.15) or over 100 degrees (0.1), a TiM571 (0.3), a UTM-30LX
+  (0.1), each with its data sheet's noise and a bias of N(0, 5 mm); 0.3 to 1.1 m over the floor.
+- objects: 2 to 5, boxes, cylinders and cones, U(0.2, 1) m wide at the beam and higher than it, anywhere
+  free, a quarter of them pushed to a wall. A cone is up to 10 cm wider all round at the floor.
+- task: 3 to 5 places; each is beside an object, U(0.35, 1) m from its edge, and follows it, or (0.25)
+  a place of the room. It is walked once (0.6), there and back (0.2) or in 2 to 4 laps (0.2), at
+  U(0.4, 1.8) m/s, in three of ten cases with a stop of U(1, 4) s at one of the places.
+- robot: anywhere free, facing the middle of the walk within N(0, 10 degrees); more than half of the
+  objects in view (three beams of a scan or more, and half of the object), where few are meant to be
+  half of them or fewer.
+- demonstrations: one or two; for half of the second ones every object has moved by N(0, 0.3 m) an axis.
+- afterwards every object moves by N(0, 0.4 m) an axis, and the robot looks for six seconds.
+
+What has no room is drawn anew: an object's place, a person's way, the robot's place, or all of it.
+A world is fair if the middle of the walker is in the laser's field of view and reach, and nothing
+stands between, for 92 % of the walk. Nothing here knows what an observer needs beyond that.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dollop.lab.outlines import inside, meeting
+from dollop.lab.people import find_way, free_places, walk_of, walks_of
+from dollop.lab.person import SHOULDERS
+from dollop.lab.rooms import GREY, OAK, STEEL, Part, Room, panel
+from dollop.lab.scanner import UTM30LX, SickLMS200, SickTiM571
+from dollop.lab.scenes import Move, Object, Person, Robot, Scene
+from dollop.pose import rotation, wrapped
+from dollop.trajectory import arc_length, resample
+
+__all__ = ["FAIR", "KINDS", "RandomWorld", "draw", "draw_room", "in_view", "moved_objects", "objects_in_view"]
+
+KINDS = (
+    "plain", "noise", "second person", "legs", "moving robot", "object moved", "few in view", "no object",
+    "one object", "ten objects", "slow scanner",
+)  # fmt: skip
+"""What is hard about a world; plain is nothing in particular."""
+SEEN = 3
+"""Beams of a scan that must meet an object for it to be in view."""
+FAIR = 0.92
+"""Least share of the walk that is in view."""
+MOMENT = 0.2
+"""s between the moments at which that is looked at."""
+SHORTEST, LONGEST = 3.0, 30.0
+"""Bounds in m on the length of a walk."""
+ATTEMPTS = 60
+"""How often a part of a world is drawn anew before all of it is."""
+STRETCH = 0.7
+"""Distance in m between the via-points of a person's way."""
+TABLE = 0.70
+"""Height in m of the lower side of a table's top."""
+CLEAR = 0.15
+"""Distance in m between a shoulder and everything that a person's way keeps where it is planned."""
+
+
+class NoRoom(ValueError):
+    """A world in which something has no room."""
+
+
+@dataclass(frozen=True, eq=False)
+class RandomWorld:
+    """A world as drawn.
+
+    Attributes
+    ----------
+    seed : int
+    kind : str
+        One of `KINDS`.
+    shape : str
+        Of the room.
+    empty : Scene
+        The room without objects and people, the robot where it watches from.
+    tour : (K, 2) float array
+        Places in m that a drive for the map visits.
+    demonstrations : tuple of Scene
+        What is recorded; the first person shows the task.
+    later : Scene
+        The objects as they stand when the task is performed, with the way that the person would walk
+        then.
+    draws : int
+        How many worlds were drawn until one was fair.
+    """
+
+    seed: int
+    kind: str
+    shape: str
+    empty: Scene
+    tour: np.ndarray
+    demonstrations: tuple
+    later: Scene
+    draws: int
+
+
+def draw(seed):
+    """The world of a seed.
+
+    Parameters
+    ----------
+    seed : int
+
+    Returns
+    -------
+    RandomWorld
+
+    Raises
+    ------
+    RuntimeError
+        If none of a thousand worlds was fair.
+    """
+    kind = KINDS[seed % len(KINDS)]
+    for draws in range(1, 1001):
+        rng = np.random.default_rng([seed, 10, draws])
+        try:
+            return RandomWorld(seed, kind, *draw_once(kind, rng), draws)
+        except ValueError:  # something has no room
+            continue
+    raise RuntimeError(f"no fair world of seed {seed} in 1000 draws")
+
+
+def draw_once(kind, rng):
+    """What a world consists of, or NoRoom."""
+    beam = float(rng.uniform(*(0.2, 0.5) if kind == "legs" else (0.3, 1.1)))
+    shape, room = draw_room(beam, rng)
+    robot = Robot((*somewhere(room, rng, 0.3), 0.0), draw_scanner(kind, rng), beam)
+    empty = Scene(room=room, robot=robot)
+    objects = draw_objects(empty, number_of_objects(kind, rng), rng)
+    return shape, *anew(lambda rng: draw_walks(empty, objects, kind, rng), rng, 10)
+
+
+def draw_walks(empty, objects, kind, rng):
+    """What happens among some objects in a room: empty scene, tour, demonstrations, and later."""
+    task = draw_task(empty, objects, kind, rng)
+    scene = anew(lambda rng: shown(empty, objects, task, rng), rng, 5)
+    scene = watched(scene, kind, rng)
+    scenes = [with_events(scene, kind, rng)]
+    if rng.random() < 0.5:
+        again = replace(empty, robot=scene.robot)
+        spread = 0.3 * (rng.random() < 0.5)
+        again = anew(lambda rng: shown(again, shifted(again, objects, spread, rng), task, rng), rng)
+        scenes.append(with_events(replace(again, robot=scene.robot), kind, rng))
+    if not all(in_view(each, walks_of(each)) >= FAIR for each in scenes):
+        raise NoRoom
+    standing = replace(scene.robot, way=())
+    later = replace(empty, robot=standing)
+    stood = moved_objects(scenes[0])
+    later = anew(lambda rng: shown(later, shifted(later, stood, 0.4, rng), task, rng), rng)
+    later = replace(later, robot=standing)
+    return replace(empty, robot=standing), draw_tour(empty, rng), tuple(scenes), later
+
+
+def anew(make, rng, attempts=ATTEMPTS):
+    """What `make` draws the first time that there is room for it."""
+    for _ in range(attempts):
+        try:
+            return make(rng)
+        except ValueError:
+            continue
+    raise NoRoom
+
+
+# ---- rooms
+
+
+def draw_room(beam, rng):
+    """Its kind, and a Room with furniture."""
+    shape = str(rng.choice(["rectangle", "L", "corridor", "two rooms"], p=[0.45, 0.2, 0.15, 0.2]))
+    width, depth = rng.uniform(4, 15), rng.uniform(4, 12)
+    if shape == "corridor":
+        width, depth = rng.uniform(8, 15), rng.uniform(2.4, 3.4)
+    corners = np.array([(0, 0), (width, 0), (width, depth), (0, depth)], dtype=float)
+    if shape == "L":
+        x, y = rng.uniform(0.4, 0.7, 2) * (width, depth)
+        corners = np.array([(0, 0), (width, 0), (width, y), (x, y), (x, depth), (0, depth)], dtype=float)
+    wall = []
+    if shape == "two rooms":
+        at, door = rng.uniform(0.35, 0.65) * width, rng.uniform(0.9, 1.3)
+        low = rng.uniform(0.2, depth - door - 0.2)
+        for begin, end in ((0.0, low), (low + door, depth)):
+            wall.append(((at, (begin + end) / 2), end - begin))
+    turn = rng.uniform(0, 2 * np.pi) if rng.random() < 0.5 else 0.0
+    place, turned = rng.uniform(-20, 20, 2), rotation(turn)
+    inner = [panel(place + turned @ middle, length, turned @ (0.0, 1.0), 0.1, 2.4, GREY) for middle, length in wall]
+    room = Room(place + corners @ turned.T, inner)
+    area = width * depth
+    for _ in range(rng.integers(0, min(6, int(area / 8)) + 1)):
+        room = anew(lambda rng, room=room: furnished(room, turn, beam, rng), rng)
+    return shape, room
+
+
+def furnished(room, turn, beam, rng):
+    """The room with one more piece of furniture, which touches no other."""
+    kind = rng.choice(["cabinet", "shelf", "table", "column"])
+    if kind == "table" and beam > TABLE:  # a robot would bump into legs that its laser does not see
+        kind = "column"
+    if kind in ("cabinet", "shelf"):
+        pieces = cabinet_at_wall(room, rng, 0.5 if kind == "cabinet" else 0.3)
+    else:
+        x, y = somewhere(room, rng, 0.5)
+        pieces = table(x, y, turn, rng) if kind == "table" else column(x, y, rng)
+    if not room.holds(pieces[-1].outline):
+        raise NoRoom
+    return replace(room, furniture=(*room.furniture, *pieces))
+
+
+def cabinet_at_wall(room, rng, depth):
+    """A cabinet with its back to a wall."""
+    k = rng.integers(len(room.corners))
+    begin, end = room.corners[k], room.corners[(k + 1) % len(room.corners)]
+    along = (end - begin) / np.linalg.norm(end - begin)
+    inwards = np.array([-along[1], along[0]])
+    width, height = rng.uniform(0.5, 1.4), rng.uniform(1.2, 2.0)
+    middle = begin + (end - begin) * rng.random() + inwards * (depth / 2 + 0.02)
+    return [panel(middle, width, along, depth, height, STEEL)]
+
+
+def table(x, y, turn, rng):
+    """A table: four legs, and a top that only somebody as high as it bumps into."""
+    width, depth = rng.uniform(0.7, 1.6), rng.uniform(0.6, 0.9)
+    parts = []
+    for sx in (-1, 1):
+        for sy in (-1, 1):
+            leg = np.array([x, y]) + rotation(turn) @ (sx * (width / 2 - 0.05), sy * (depth / 2 - 0.05))
+            parts.append(Part("box", (*leg, TABLE / 2), (0.05, 0.05, TABLE), OAK, turn))
+    return [*parts, Part("box", (x, y, TABLE + 0.02), (width, depth, 0.04), OAK, turn)]
+
+
+def column(x, y, rng):
+    """A round column up to the ceiling."""
+    size = rng.uniform(0.2, 0.5)
+    return [Part("cylinder", (x, y, 1.2), (size, size, 2.4), GREY)]
+
+
+def somewhere(room, rng, free):
+    """A place (2,) in a room with so much free room round it, in m."""
+    low, high = np.split(room.bounds, 2)
+    points = rng.uniform(low, high, (100, 2))
+    found = points[inside(points, room.corners) & (room.distance(points) >= free)]
+    if not len(found):
+        raise NoRoom
+    return found[0]
+
+
+# ---- laser and objects
+
+
+def draw_scanner(kind, rng):
+    """The laser: slow ones only where they are what is hard, and noise likewise."""
+    errors = {"bias": float(rng.normal(0, 0.005))}
+    if kind == "noise":
+        errors |= {"noise": 0.030, "mixed": 0.2, "missed": 0.02}
+    choice = rng.choice(5, p=[0.35, 0.15, 0.1, 0.3, 0.1])
+    if kind == "slow scanner":
+        return SickLMS200(180, 0.5, "cm", **errors) if choice < 3 else SickLMS200(100, 0.25, "cm", **errors)
+    settings = (180, 1, "mm"), (180, 1, "cm"), (100, 1, "cm")
+    if choice < len(settings):
+        return SickLMS200(*settings[choice], **errors)
+    return SickTiM571(**errors) if choice == 3 else UTM30LX(**errors)
+
+
+def number_of_objects(kind, rng):
+    """How many objects there are."""
+    fixed = {"no object": 0, "one object": 1, "ten objects": 10, "few in view": 6}
+    return fixed.get(kind, int(rng.integers(2, 6)))
+
+
+def draw_objects(empty, count, rng):
+    """Objects that stand free, a tuple."""
+    objects = ()
+    for _ in range(count):
+        objects = anew(lambda rng, there=objects: (*there, one_more(empty, there, rng)), rng)
+    return objects
+
+
+def one_more(empty, there, rng):
+    """An object that stands free of those that are there."""
+    shape = str(rng.choice(["box", "cylinder", "cone"]))
+    beam = empty.robot.beam_height
+    height = float(rng.uniform(beam + 0.1, max(1.5, beam + 0.3)))
+    width, depth = rng.uniform(0.2, 1.0, 2)
+    turn = float(rng.uniform(0, np.pi))
+    if shape == "cone":  # so wide at the beam, and at most 10 cm wider all round at the floor
+        flare = min(rng.uniform(0.05, 0.3) * width, 0.1) * 2
+        slope = flare / beam
+        each = Object(shape, (0, 0), (width + flare,) * 2, height, top=max(0.0, width + flare - slope * height))
+    else:
+        each = Object(shape, (0, 0), (width, depth if shape == "box" else width), height, turn if shape == "box" else 0)
+    place = somewhere(empty.room, rng, 0.0)
+    if rng.random() < 0.25:
+        place = pushed_to_wall(empty.room, each, place)
+    each = each.at(place)
+    Scene((*there, each), empty.room, aside(empty.robot, empty.room, (*there, each)))
+    return each
+
+
+def pushed_to_wall(room, each, place):
+    """The place moved away from the middle until the object nearly touches something."""
+    middle = room.corners.mean(axis=0)
+    way = (place - middle) / np.linalg.norm(place - middle)
+    best = place
+    for step in np.arange(0.0, 8.0, 0.05):
+        there = place + step * way
+        if room.distance(there)[0] <= each.reach + 0.03:
+            break
+        best = there
+    return best
+
+
+def aside(robot, room, objects):
+    """The robot anywhere where it is not in the way, for a check of everything else."""
+    low, high = np.split(room.bounds, 2)
+    points = low + np.stack(np.meshgrid(*2 * [np.linspace(0, 1, 40)]), axis=-1).reshape(-1, 2) * (high - low)
+    free = room.distance(points)
+    for each in objects:
+        free = np.minimum(free, np.linalg.norm(points - each.position, axis=1) - each.reach)
+    return replace(robot, pose=(*points[free.argmax()], 0.0), way=())
+
+
+def shifted(scene, objects, spread, rng):
+    """The objects elsewhere, each moved by N(0, spread) an axis; what has no room is drawn anew."""
+    there = ()
+    for each in objects:
+
+        def one_moved(rng, each=each, there=there):
+            new = each.at(each.position + rng.normal(0, spread, 2))
+            Scene((*there, new), scene.room, scene.robot)
+            return (*there, new)
+
+        there = anew(one_moved, rng)
+    return there
+
+
+def moved_objects(scene):
+    """A scene's objects as they stand after everything that happens in it."""
+    objects = list(scene.objects)
+    for move in scene.moves:
+        objects[move.object] = objects[move.object].at(move.to)
+    return tuple(objects)
+
+
+# ---- the task and the walk
+
+
+@dataclass(frozen=True)
+class Task:
+    """What the person does, wherever the objects stand.
+
+    Attributes
+    ----------
+    anchors : tuple of (int or None, tuple of 2 floats)
+        The places: the object that each follows and the offset from it, or None and a place, in m.
+    gait : dict
+        More of the Person's fields.
+    """
+
+    anchors: tuple
+    gait: dict
+
+    def places(self, objects):
+        """Where the places are among the objects, (K, 2) in m."""
+        return np.array([offset if k is None else np.add(objects[k].position, offset) for k, offset in self.anchors])
+
+
+def draw_task(empty, objects, kind, rng):
+    """A task among the objects, its places where a person has room."""
+    scene = Scene(objects, empty.room, aside(empty.robot, empty.room, objects))
+    anchors = [anew(lambda rng: draw_anchor(scene, rng), rng) for _ in range(rng.integers(3, 6))]
+    gait = {"speed": float(rng.uniform(0.4, 1.8)), "body": "legs" if kind == "legs" else "torso", "scatter": 0.03}
+    manner = rng.choice(["once", "back", "laps"], p=[0.6, 0.2, 0.2])
+    if manner == "back":
+        gait["back"] = True
+    if manner == "laps":
+        gait["laps"] = int(rng.integers(2, 5))
+    if rng.random() < 0.3:
+        gait["stop"] = int(rng.integers(len(anchors))), float(rng.uniform(1, 4))
+    return Task(tuple(anchors), gait)
+
+
+def draw_anchor(scene, rng):
+    """A place of a task: (object, offset from it in m), or (None, place in m)."""
+    if not scene.objects or rng.random() < 0.25:
+        k, start, offset = None, np.zeros(2), somewhere(scene.room, rng, 0.0)
+    else:
+        k = int(rng.integers(len(scene.objects)))
+        each, bearing = scene.objects[k], rng.uniform(0, 2 * np.pi)
+        start, distance = np.array(each.position), each.reach + rng.uniform(0.35, 1.0)
+        offset = distance * np.array([np.cos(bearing), np.sin(bearing)])
+    if not free_places(scene, [start + offset], CLEAR)[0]:
+        raise NoRoom
+    return k, tuple(offset.tolist())
+
+
+def shown(scene, objects, task, rng):
+    """The scene with the objects, and a person who shows the task among them."""
+    scene = Scene(objects, scene.room, aside(scene.robot, scene.room, objects))
+    places = task.places(objects)
+    stop = places[task.gait["stop"][0]] if "stop" in task.gait else None
+    gait = {name: value for name, value in task.gait.items() if name != "stop"}
+    closed = np.vstack([places, places[:1]]) if "laps" in gait else places
+    way = find_way(scene, closed, CLEAR)
+    if "laps" in gait:
+        gait["laps"] = int(np.clip(LONGEST // arc_length(way)[-1], 1, gait["laps"]))
+    way = resample(way, 2 + int(arc_length(way)[-1] / STRETCH))
+    way = way[:-1] if "laps" in gait else way
+    if stop is not None:
+        gait["stops"] = [(int(np.linalg.norm(way - stop, axis=1).argmin()), task.gait["stop"][1])]
+
+    def walking(rng):
+        person = Person(tuple(map(tuple, way)), seed=int(rng.integers(2**31)), **gait)
+        if not SHORTEST <= arc_length(walk_of(person, scene).positions)[-1] <= LONGEST:
+            raise NoRoom
+        return replace(scene, people=(person,))
+
+    return anew(walking, rng, attempts=5)
+
+
+def watched(scene, kind, rng):
+    """The scene with the robot somewhere from where the walk is in view, and half of the objects, or not."""
+    walks = [walk_of(person, scene) for person in scene.people]
+    middle, least = walks[0].positions.mean(axis=0), scene.robot.radius + SHOULDERS / 2
+
+    def standing(rng):
+        place = somewhere(scene.room, rng, scene.robot.radius)
+        if np.linalg.norm(walks[0].positions - place, axis=1).min() < least:
+            raise NoRoom
+        facing = np.arctan2(*(middle - place)[::-1]) + rng.normal(0, np.radians(10))
+        there = replace(scene, robot=replace(scene.robot, pose=(*place, float(wrapped(facing)))))
+        few = len(there.objects) > 1 and objects_in_view(there).sum() <= len(there.objects) / 2
+        if few != (kind == "few in view") or in_view(there, walks) < FAIR:
+            raise NoRoom
+        return there
+
+    there = anew(standing, rng)
+    return anew(lambda rng: driving(there, rng), rng) if kind == "moving robot" else there
+
+
+def driving(scene, rng):
+    """The scene with its robot driving towards the walk and somewhere else from there, slowly."""
+    place = np.array(scene.robot.pose[:2])
+    goals = [place + rng.normal(0, 1.0, 2) for _ in range(2)]
+    way = find_way(replace(scene, people=()), np.vstack([place, *goals]), CLEAR)
+    walked = walk_of(scene.people[0], scene).positions
+    if min(np.linalg.norm(walked - each, axis=1).min() for each in resample(way, 30)) < 0.5:
+        raise NoRoom
+    robot = replace(scene.robot, way=tuple(map(tuple, way[1:])), speed=float(rng.uniform(0.1, 0.4)))
+    return replace(scene, robot=robot)
+
+
+def with_events(scene, kind, rng):
+    """The scene with the robot where it watches from, and what else happens in worlds of this kind."""
+    if kind == "second person":
+        return anew(lambda rng: with_second(scene, rng), rng)
+    if kind == "object moved":
+        return anew(lambda rng: with_move(scene, rng), rng)
+    walks_of(scene)
+    return scene
+
+
+def with_second(scene, rng):
+    """The scene with somebody else who crosses it, or walks about in it all the time."""
+    first = walks_of(scene)[0]
+    places = [somewhere(scene.room, rng, 0.35) for _ in range(rng.integers(2, 5))]
+    alone = replace(scene, people=())
+    way = find_way(alone, places)
+    duration, speed = first.t[-1], float(rng.uniform(0.4, 1.8))
+    about = bool(rng.random() < 0.5)
+    second = Person(
+        tuple(map(tuple, way)),
+        speed,
+        begin=float(rng.uniform(0.5, 0.5 + 0.5 * duration * (not about))),
+        back=about,
+        laps=max(1, int(duration * speed / max(1.0, 2 * np.linalg.norm(np.diff(way, axis=0), axis=1).sum())))
+        if about
+        else 1,
+        seed=int(rng.integers(2**31)),
+    )
+    both = replace(scene, people=(*scene.people, second))
+    walks_of(both)
+    return both
+
+
+def with_move(scene, rng):
+    """The scene with one of its objects moved meanwhile, out of the way of who walks."""
+    walk = walks_of(scene)[0]
+    k = int(rng.integers(len(scene.objects)))
+    to = np.add(scene.objects[k].position, rng.normal(0, 0.8, 2))
+    if np.linalg.norm(walk.positions - to, axis=1).min() < scene.objects[k].reach + 0.35:
+        raise ValueError
+    replace(scene, objects=tuple(each.at(to) if i == k else each for i, each in enumerate(scene.objects)))
+    when = float(rng.uniform(0.25, 0.75) * walk.t[-1])
+    return replace(scene, moves=(Move(k, when, tuple(to)),))
+
+
+# ---- what is in view
+
+
+def in_view(scene, walks):
+    """Share of the moments of the walk at which the walker's middle is in view of the laser.
+
+    Where the robot drives, it is where it stands at the beginning.
+    """
+    times = np.arange(0.0, walks[0].t[-1], MOMENT)
+    pose, scanner = scene.robot.laser_pose, scene.robot.scanner
+    ways = [np.column_stack([np.interp(times, each.t, axis) for axis in each.positions.T]) for each in walks]
+    away = ways[0] - pose[:2]
+    distances, bearings = np.linalg.norm(away, axis=1), np.arctan2(away[:, 1], away[:, 0])
+    within = np.abs(wrapped(bearings - pose[2])) <= np.radians(scanner.fov) / 2
+    free = meeting(pose[:2], bearings, scene.section).min(axis=1) >= distances
+    for other in ways[1:]:
+        along = ((other - pose[:2]) * away).sum(axis=1) / distances
+        off = np.linalg.norm(other - pose[:2] - along[:, None] * away / distances[:, None], axis=1)
+        free &= ~((along > 0) & (along < distances) & (off < SHOULDERS / 2))
+    return float(np.mean(within & free & (distances <= scanner.max_range)))
+
+
+def objects_in_view(scene, pose=None, objects=None):
+    """Which objects a laser sees well enough.
+
+    Three beams of a scan or more meet the object first, and half of those or more that would meet it
+    if it stood there alone.
+
+    Parameters
+    ----------
+    scene : Scene
+    pose : (3,) float array, optional
+        Of the laser; where it is at the beginning when not given.
+    objects : sequence of N Object, optional
+        In place of the scene's.
+
+    Returns
+    -------
+    (N,) bool array
+    """
+    pose = scene.robot.laser_pose if pose is None else pose
+    height, scanner = scene.robot.beam_height, scene.robot.scanner
+    outlines = [each.outline(height) for each in (scene.objects if objects is None else objects)]
+    if not outlines:
+        return np.zeros(0, bool)
+    turns = np.arange(-np.pi, np.pi, np.radians(scanner.resolution))
+    bearings = pose[2] + turns
+    within = np.abs(turns) <= np.radians(scanner.fov) / 2
+    to_objects = meeting(pose[:2], bearings, outlines)
+    others = [part.outline for part in scene.room.parts if part.reaches(height)]
+    nearest = np.minimum(meeting(pose[:2], bearings, others).min(axis=1), to_objects.min(axis=1))
+    first = (to_objects <= np.minimum(nearest, scanner.max_range)[:, None]) & within[:, None]
+    beams, alone = np.count_nonzero(first, axis=0), np.count_nonzero(np.isfinite(to_objects), axis=0)
+    return (beams >= SEEN) & (beams >= alone / 2)
+
+
+def draw_tour(empty, rng):
+    """Places from which, taken together, a laser sees the free floor of a room."""
+    low, high = np.split(empty.room.bounds, 2)
+    points = rng.uniform(low, high, (400, 2))
+    points = points[empty.room.distance(points) > 0.45]
+    if not len(points):
+        raise NoRoom
+    unseen, tour = np.ones(len(points), bool), [points[0]]
+    while (unseen.any() or len(tour) < 3) and len(tour) < 12:
+        away = points - tour[-1]
+        distances = np.linalg.norm(away, axis=1)
+        blocked = meeting(tour[-1], np.arctan2(away[:, 1], away[:, 0]), empty.section).min(axis=1) < distances
+        unseen &= blocked | (distances > 5.0)
+        left = unseen if unseen.any() else np.ones(len(points), bool)
+        tour.append(points[left][np.argmin(distances[left])] if unseen.any() else points[np.argmax(distances)])
+    return find_way(empty, np.array(tour), clear=0.1)

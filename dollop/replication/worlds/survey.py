@@ -1,0 +1,268 @@
+"""The study of random worlds behind "Outside the paper's room" in REPLICATION.md: `dollop study worlds`.
+
+One row for each seed goes into study/worlds.csv, which is replaced whole after every world, so that an
+interrupted study goes on where it was. From the table come worlds.json, the summary by kind; a sheet
+of pictures of the worst worlds; and the tables in the report.
+"""
+
+from collections import Counter
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pandas as pd
+
+from dollop.extras import need
+from dollop.formats.files import FormatError, check_writable, whole_file
+from dollop.replication.running import as_json, put_between_marks, report_beside, run_all
+from dollop.replication.worlds.chain import CAUSES, COLUMNS, OUTCOMES, judge
+from dollop.replication.worlds.draw import KINDS, draw
+
+__all__ = ["FIRST", "command", "read_table", "summary"]
+
+SEEDS, QUICK_SEEDS = 300, 11
+WORST = 12
+"""How many worlds the sheet of pictures shows."""
+FIRST = "worlds_first.csv"
+"""The table of the first run, before anything was mended; beside the table if it is there."""
+
+
+def work(seed, _=None):
+    """The seed, and its row of the table: every value as it is written."""
+    world = draw(seed)
+    row = judge(world).row(world)
+    return seed, {name: written(value) for name, value in row.items()}
+
+
+def written(value):
+    """A value as the table has it: numbers to four digits, nothing for what is no number."""
+    if isinstance(value, str):
+        return value
+    return "" if not np.isfinite(value) else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def read_table(path):
+    """Read a table of worlds.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    pandas.DataFrame
+        `COLUMNS`, all of them text but the seed, which is the index as well; empty if there is no
+        file.
+
+    Raises
+    ------
+    FormatError
+        If the file is something else.
+    """
+    path = Path(path)
+    if not path.exists():
+        return as_table([])
+    try:
+        table = pd.read_csv(path, dtype=str, keep_default_na=False)
+        if list(table.columns) != list(COLUMNS):
+            raise ValueError(f"columns must be {', '.join(COLUMNS)}, got {', '.join(table.columns)}")
+        unknown = set(table.outcome) - set(OUTCOMES)
+        if unknown:
+            raise ValueError(f"an outcome must be one of {', '.join(OUTCOMES)}, got {unknown.pop()!r}")
+        return as_table(table)
+    except ValueError as error:
+        raise FormatError(f"not a table of worlds: {error}", path) from error
+
+
+def as_table(rows):
+    """Rows as the table, in the order of the seeds."""
+    table = pd.DataFrame(rows, columns=list(COLUMNS)).astype(str)
+    table.index = table.seed.astype(int)
+    return table.sort_index()
+
+
+def write_table(table, path):
+    """Write the table, whole or not at all."""
+    with whole_file(path, "w") as stream:
+        table.to_csv(stream, index=False)
+
+
+def run_survey(seeds, path, scheduler=None, jobs=-1):
+    """Fill the table with the worlds that are missing in it; its rows of these seeds.
+
+    Parameters
+    ----------
+    seeds : sequence of int
+    path : Path
+        The table; made if it is not there.
+    scheduler : str, optional
+        Address of a Dask scheduler; all cores of this machine without it.
+    jobs : int
+        Number of worker processes on this machine, -1 for one per core.
+
+    Returns
+    -------
+    pandas.DataFrame
+    """
+    table = read_table(path)
+
+    def keep(found):
+        nonlocal table
+        table = as_table(pd.concat([table, pd.DataFrame([found[1]])]))
+        write_table(table, path)
+
+    run_all({seed: None for seed in seeds if seed not in table.index}, work, keep, scheduler, jobs)
+    return table.loc[[seed for seed in seeds if seed in table.index]]
+
+
+# ---- summing up
+
+
+def summary(table):
+    """How the worlds of a table ended, by kind, and what was wrong.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        As `read_table` has it.
+
+    Returns
+    -------
+    dict
+        "kinds": for each kind, and for "all", worlds, each outcome, and how many of the silently wrong
+        ones were refused later; "causes": how many worlds had each, and how many of all had it as the
+        first; "refusals": how many at each step; "draws": the mean number of draws of a world.
+    """
+    groups = {kind: table[table.kind == kind] for kind in KINDS} | {"all": table}
+    return {
+        "seeds": [int(table.index.min()), int(table.index.max())],
+        "kinds": {kind: counted(rows) for kind, rows in groups.items() if len(rows)},
+        "causes": {
+            cause: {
+                "worlds": int(table.causes.str.split("; ").map(lambda all_, cause=cause: cause in all_).sum()),
+                "first": int((table.cause == cause).sum()),
+            }
+            for cause in CAUSES
+        },
+        "refusals": dict(Counter(table.stage[table.outcome == "refused"])),
+        "draws": round(float(table.draws.astype(int).mean()), 2),
+    }
+
+
+def counted(rows):
+    """How some worlds ended."""
+    ends = {outcome: int((rows.outcome == outcome).sum()) for outcome in OUTCOMES}
+    wrong = rows[rows.outcome == "silently wrong"]
+    return {"worlds": len(rows), **ends, "refused later": int((wrong.stage != "").sum())}
+
+
+def tables(found, first=None):
+    """The summary as two Markdown tables, beside the first run's where there is one."""
+    head = ["kind of world", "worlds", *OUTCOMES, "refused later"] + (["silently wrong at first"] if first else [])
+    lines = [row(head), "|" + "---|" * len(head)]
+    for kind, counts in found["kinds"].items():
+        name = f"**{kind}**" if kind == "all" else kind
+        before = [first["kinds"].get(kind, {}).get("silently wrong", "")] if first else []
+        lines.append(row([name, *counts.values(), *before]))
+    head = ["what was silently wrong", "worlds", "of these the first thing"] + (["worlds at first"] if first else [])
+    lines += ["", row(head), "|" + "---|" * len(head)]
+    for cause, counts in found["causes"].items():
+        lines.append(row([cause, *counts.values(), *([first["causes"][cause]["worlds"]] if first else [])]))
+    steps = ", ".join(f"{count} at {step}" for step, count in sorted(found["refusals"].items()))
+    return "\n".join([*lines, "", f"Refused: {steps or 'none'}. Draws of a world until it was fair: {found['draws']}."])
+
+
+def row(cells):
+    """A row of a Markdown table."""
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def worst_seeds(table):
+    """The seeds of the worst worlds: silently wrong, by the least share of trajectory, walk and law right."""
+    wrong = table[table.outcome == "silently wrong"]
+    shares = wrong[["user_right", "covered", "law_covered"]].replace("", "1").astype(float)
+    kept = shares.assign(law=1 - wrong.law_astray.replace("", "0").astype(float)).min(axis=1)
+    return kept.sort_values(kind="stable").index[:WORST].tolist()
+
+
+def draw_sheet(seeds, path):
+    """A sheet of pictures of some worlds, gone through again."""
+    import matplotlib.pyplot as plt
+
+    from dollop import plot
+    from dollop.replication.worlds.picture import draw_judged
+
+    worlds = [draw(seed) for seed in seeds]
+    judgements = joblib.Parallel(-1)(joblib.delayed(judge)(world) for world in worlds)
+    with plot.style():
+        figure, axes = plt.subplots(3, 4, figsize=(16, 12))
+        for ax in axes.flat:
+            ax.axis("off")
+        for ax, world, judgement in zip(axes.flat, worlds, judgements, strict=False):
+            ax.axis("on")
+            draw_judged(ax, world, judgement)
+        handles = {
+            label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
+        }
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles) or 1)
+        with whole_file(path) as stream:
+            figure.savefig(stream, dpi=80)
+        plt.close(figure)
+
+
+# ---- the command
+
+
+def command(options):
+    """Run the study of random worlds that the command line asks for, and write what follows from it.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        seeds (None for the usual number), first_seed, quick, folder (None for the usual one), scheduler.
+
+    Raises
+    ------
+    ValueError
+        If there is no seed, or workers kept dying.
+    KeyboardInterrupt
+        When interrupted, with the words where it goes on.
+    """
+    count = (QUICK_SEEDS if options.quick else SEEDS) if options.seeds is None else options.seeds
+    if count < 1 or options.first_seed < 0:
+        raise ValueError(f"worlds need a seed or more, from 0 on, got {count} from {options.first_seed} on")
+    need("lab")
+    folder = options.folder or Path("study-quick" if options.quick else "study")
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "worlds.csv"
+    check_writable(path)
+    try:
+        seeds = range(options.first_seed, options.first_seed + count)
+        table = run_survey(seeds, path, options.scheduler)
+    except RuntimeError as error:
+        raise ValueError(f"{error}. Run the same command again to go on") from error
+    except KeyboardInterrupt:
+        done = f"what was done is in {path}, the same command goes on there"
+        raise KeyboardInterrupt(done if path.exists() else "nothing was done yet") from None
+    publish(table, folder)
+
+
+def publish(table, folder):
+    """Write the summary and the sheet of the worst, and the tables in REPLICATION.md if it tells of this study."""
+    found = summary(table)
+    first = folder / FIRST
+    before = summary(read_table(first)) if first.exists() else None
+    for kind, counts in found["kinds"].items():
+        print(f"{kind:15}" + "".join(f"{name} {count:<5}" for name, count in counts.items()))
+    with whole_file(folder / "worlds.json", "w") as stream:
+        stream.write(as_json(found))
+    sheet = folder / "worlds_worst.png"
+    draw_sheet(worst_seeds(table), sheet)
+    written_too = [folder / "worlds.csv", folder / "worlds.json", sheet]
+    report = report_beside(folder)
+    if report:
+        text = put_between_marks(report.read_text(), "worlds", tables(found, before))
+        with whole_file(report, "w") as stream:
+            stream.write(text)
+        written_too.append(report)
+    print(f"wrote {', '.join(map(str, written_too))}")

@@ -1,0 +1,287 @@
+"""Random worlds: drawn as written down, judged by their truth, and a study that goes on where it was."""
+
+import ast
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from places import ROOT
+
+from dollop.cli import main
+from dollop.environment import Environment
+from dollop.formats.files import FormatError
+from dollop.lab.people import walk_of, walks_of
+from dollop.lab.scenes import Object, Person, Scene
+from dollop.replication.worlds import chain, survey
+from dollop.replication.worlds.chain import Judgement, judge, judge_objects, judge_user, side
+from dollop.replication.worlds.draw import FAIR, KINDS, draw, draw_room, in_view, objects_in_view
+
+SEEDS = range(90_002, 90_002 + len(KINDS))
+
+
+@pytest.fixture(scope="module")
+def worlds():
+    """A world of every kind."""
+    return [draw(seed) for seed in SEEDS]
+
+
+# ---- the distribution
+
+
+def test_a_seed_is_a_world(worlds):
+    """The same seed draws the same scenes, another one others."""
+    again = draw(SEEDS[0])
+    assert again.later.to_dict() == worlds[0].later.to_dict() != worlds[1].later.to_dict()
+    assert [each.to_dict() for each in again.demonstrations] == [each.to_dict() for each in worlds[0].demonstrations]
+    assert np.array_equal(again.tour, worlds[0].tour)
+
+
+def test_any_run_of_seeds_has_as_many_of_each_kind(worlds):
+    """Kinds follow each other, so that a study of any seeds compares them evenly."""
+    assert all([world.kind for world in worlds].count(kind) == 1 for kind in KINDS)
+
+
+def test_kinds_are_what_they_say(worlds):
+    """Numbers of objects and people, bodies, noise, rates and events are those of the kind."""
+    numbers = {"no object": 0, "one object": 1, "ten objects": 10}
+    for world in worlds:
+        for scene in world.demonstrations:
+            assert len(scene.objects) == numbers.get(world.kind, len(scene.objects))
+            assert len(scene.people) == 1 + (world.kind == "second person")
+            assert (scene.people[0].body == "legs") == (world.kind == "legs")
+            assert (scene.robot.scanner.noise == 0.030) == (world.kind == "noise")
+            assert (scene.robot.scanner.rate <= 5) == (world.kind == "slow scanner")
+            assert bool(scene.robot.way) == (world.kind == "moving robot")
+            assert bool(scene.moves) == (world.kind == "object moved")
+
+
+def test_every_world_is_fair(worlds):
+    """The walk is in view as far as promised; half of the objects are, or not where few are to be."""
+    for world in worlds:
+        assert all(in_view(scene, walks_of(scene)) >= FAIR for scene in world.demonstrations)
+        scene = world.demonstrations[0]
+        if len(scene.objects) > 1:
+            few = objects_in_view(scene).sum() <= len(scene.objects) / 2
+            assert few == (world.kind == "few in view")
+
+
+def test_rooms_are_of_every_shape():
+    """Among a few dozen worlds there are rectangles, L shapes, corridors and two rooms with a door."""
+    rooms = [draw_room(0.5, np.random.default_rng(seed)) for seed in range(60)]
+    assert {shape for shape, _ in rooms} == {"rectangle", "L", "corridor", "two rooms"}
+    assert all(len(room.corners) == (6 if shape == "L" else 4) for shape, room in rooms)
+    assert any(part.turn for _, room in rooms for part in room.parts)
+
+
+def test_the_generator_knows_nothing_of_the_observer():
+    """It draws from the laboratory and geometry alone: no threshold of what is measured can be in it."""
+    tree = ast.parse((ROOT / "dollop/replication/worlds/draw.py").read_text(encoding="utf-8"))
+    rooms = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)} - {"dataclasses"}
+    assert all(room.startswith("dollop.lab.") or room in ("dollop.pose", "dollop.trajectory") for room in rooms)
+
+
+def test_what_is_hidden_is_not_in_view():
+    """Of two objects in a row the laser sees the nearer, and the other where it stands beside it."""
+    near, far = Object("box", (4.5, 2.6), (0.9, 0.3), 1.0), Object("cylinder", (4.5, 5.0), (0.3, 0.3), 1.0)
+    assert objects_in_view(Scene([near, far])).tolist() == [True, False]
+    assert objects_in_view(Scene([near, far.at((7.0, 5.0))])).tolist() == [True, True]
+
+
+# ---- the judge
+
+
+def truth_of(positions, rate=10.0):
+    """A truth table of one person."""
+    t = np.arange(len(positions)) / rate
+    return pd.DataFrame({"t": t, "x": positions[:, 0], "y": positions[:, 1], "heading": 0.0})
+
+
+STRAIGHT = np.column_stack([np.linspace(0, 10, 101), np.zeros(101)])
+
+
+def judged(positions, truth, rows=slice(None)):
+    """What is blamed when a trajectory is compared with a truth."""
+    user, judgement = SimpleNamespace(t=truth.t.to_numpy()[rows], positions=positions[rows]), Judgement()
+    judge_user(user, truth, judgement)
+    return judgement.causes
+
+
+@pytest.mark.parametrize(
+    ("shift", "rows", "causes"),
+    [
+        ((0.0, 0.2), slice(None), []),
+        ((0.0, 0.5), slice(None), ["user wrong", "part of the walk missing"]),
+        ((0.0, 0.0), slice(0, 70), ["part of the walk missing"]),
+    ],
+)
+def test_the_user_is_judged_in_metres_and_shares(shift, rows, causes):
+    """Near is right, far is wrong, and a part is a part."""
+    assert judged(STRAIGHT + shift, truth_of(STRAIGHT), rows) == causes
+
+
+def test_a_trajectory_of_two_people_is_the_user_in_part():
+    """Where a fifth of the trajectory is somebody else's, that is said, and that the rest is missing."""
+    mixed = STRAIGHT.copy()
+    mixed[:20] += (0.0, 3.0)
+    assert judged(mixed, truth_of(STRAIGHT)) == ["user in part", "part of the walk missing"]
+
+
+def looked_at(scene, boxes):
+    """What is blamed when boxes are what was found of a scene."""
+    log = SimpleNamespace(poses=np.array([scene.robot.laser_pose]))
+    judgement = Judgement()
+    judge_objects(Environment(boxes), SimpleNamespace(scene=scene, truth=None, log=log), judgement)
+    return judgement.causes
+
+
+def test_objects_are_judged_by_where_they_stand():
+    """True boxes are right, one too few is missed, one elsewhere is false; what is out of view may be missing."""
+    scene = Scene([Object.trash_can((2.5, 3.6)), Object.trash_can((6.5, 3.6))])
+    elsewhere = [4.0, 5.0, 4.4, 5.4]
+    assert looked_at(scene, scene.boxes) == []
+    assert looked_at(scene, scene.boxes[:1]) == ["object missed"]
+    assert looked_at(scene, [*scene.boxes, elsewhere]) == ["false object"]
+    further = replace(scene.robot, pose=(4.5, 2.4, np.pi / 2))
+    behind = Scene([*scene.objects, Object.trash_can((4.5, 1.2))], robot=further)
+    assert looked_at(behind, scene.boxes) == []
+
+
+def test_sides_are_those_of_the_path():
+    """Left is +1, right -1, and what is far off or passed twice is on no side."""
+    assert side(STRAIGHT, np.array([5.0, 0.5])) == 1
+    assert side(STRAIGHT, np.array([5.0, -0.5])) == -1
+    assert side(STRAIGHT, np.array([5.0, 2.0])) == 0
+    there_and_back = np.vstack([STRAIGHT, STRAIGHT[::-1] + (0.0, -0.1)])
+    assert side(there_and_back, np.array([5.0, 0.5])) == 0
+
+
+def test_a_note_makes_what_is_wrong_doubtful():
+    """What a note says beforehand is not silent, and what was silent stays wrong though it is refused later."""
+    doubtful, wrong = Judgement(), Judgement()
+    doubtful.listen([], {"observation": SimpleNamespace(notes=("two people walk",))})
+    for each in (doubtful, wrong):
+        each.blame("user wrong", True)
+    wrong.refused = "adapt", "no matching"
+    assert (doubtful.outcome, wrong.outcome, Judgement().outcome) == ("doubtful", "silently wrong", "right")
+    assert Judgement(refused=("learn", "no")).outcome == "refused"
+
+
+def test_an_error_ends_the_chain_and_is_told(monkeypatch, worlds):
+    """A refusal is told with its step; an error that is not of the library's own with its name."""
+    refusing = {"map": (lambda world, results: {}["nothing"], chain.judge_nothing), **chain.STEPS}
+    refusing["map"] = (lambda world, results: {}["nothing"], chain.judge_nothing)
+    monkeypatch.setattr(chain, "STEPS", refusing)
+    row = judge(worlds[0]).row(worlds[0])
+    assert (row["outcome"], row["stage"], row["told"]) == ("refused", "map", "KeyError: 'nothing'")
+
+
+# ---- the study
+
+
+def fake_work(seed, _=None):
+    """A row without a world."""
+    row = dict.fromkeys(survey.COLUMNS, "") | {"seed": str(seed), "kind": KINDS[seed % len(KINDS)], "draws": "1"}
+    ends = {0: ("right", ""), 1: ("refused", ""), 2: ("silently wrong", "user in part; collision")}
+    outcome, causes = ends[seed % 3]
+    stage = {"refused": "adapt"}.get(outcome, "")
+    shares = {"user_right": f"{0.5 + seed / 1000}", "covered": "1", "law_covered": "1", "law_astray": "0"}
+    return seed, row | shares | {
+        "outcome": outcome, "causes": causes, "cause": causes.split(";")[0], "stage": stage
+    }  # fmt: skip
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    """The study without its worlds."""
+    monkeypatch.setattr(survey, "work", fake_work)
+
+
+def test_a_study_of_worlds_goes_on_where_it_was(tmp_path, fake, monkeypatch):
+    """What is in the table is kept as it is, only the rest is run, and the table is in the order of seeds."""
+    path, seen = tmp_path / "worlds.csv", []
+    first = survey.run_survey(range(4, 8), path, jobs=1)
+    monkeypatch.setattr(survey, "work", lambda seed, _: (seen.append(seed), fake_work(seed))[1])
+    both = survey.run_survey(range(10), path, jobs=1)
+    assert sorted(seen) == [0, 1, 2, 3, 8, 9]
+    assert both.index.tolist() == list(range(10)) == survey.read_table(path).index.tolist()
+    assert both.loc[4:7].equals(first)
+
+
+def test_the_summary_counts_by_kind_and_cause(tmp_path, fake):
+    """Ends add up to the worlds of each kind, causes are counted in every world that has them, the first apart."""
+    table = survey.run_survey(range(33), tmp_path / "worlds.csv", jobs=1)
+    found = survey.summary(table)
+    assert found["kinds"]["all"] == {
+        "worlds": 33, "right": 11, "refused": 11, "doubtful": 0, "silently wrong": 11, "refused later": 0
+    }  # fmt: skip
+    assert all(counts["worlds"] == 3 for kind, counts in found["kinds"].items() if kind != "all")
+    assert found["causes"]["collision"] == {"worlds": 11, "first": 0}
+    assert found["causes"]["user in part"] == {"worlds": 11, "first": 11}
+    assert found["refusals"] == {"adapt": 11} and found["draws"] == 1.0
+    text = survey.tables(found, found)
+    assert "| **all** | 33 | 11 | 11 | 0 | 11 | 0 | 11 |" in text and "11 at adapt" in text
+
+
+def test_the_worst_come_first(tmp_path, fake):
+    """The sheet shows silently wrong worlds, those with the least share right first."""
+    table = survey.run_survey(range(60), tmp_path / "worlds.csv", jobs=1)
+    assert survey.worst_seeds(table) == list(range(2, 38, 3))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"), [("seed,kind\n1,plain\n", "columns must be"), ("", "not a table of worlds")]
+)
+def test_a_table_that_is_none_is_refused(tmp_path, text, message):
+    """A damaged table is told with its name, and nothing is written over it."""
+    path = tmp_path / "worlds.csv"
+    path.write_text(text)
+    with pytest.raises(FormatError, match=message):
+        survey.read_table(path)
+    assert path.read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["worlds", "--seeds", "0"], "a seed or more"),
+        (["worlds", "--first-seed", "-1"], "a seed or more"),
+        (["worlds", "filter"], "a study of its own"),
+        (["filter", "--first-seed", "5"], "from seed 0 on"),
+    ],
+)
+def test_a_study_that_cannot_be_is_refused(tmp_path, arguments, message):
+    """Too few seeds, or worlds mixed with claims, are refused before anything is made."""
+    with pytest.raises(SystemExit, match=message):
+        main(["study", *arguments, "--folder", str(tmp_path / "study")])
+    assert not (tmp_path / "study").exists()
+
+
+# ---- the whole of it
+
+
+def test_the_chain_ends_alike_twice(tmp_path):
+    """Two worlds give the same rows in two runs, one of them on two processes."""
+    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
+    one = survey.run_survey(SEEDS[7:9], tmp_path / "one.csv", jobs=1)
+    two = survey.run_survey(SEEDS[7:9], tmp_path / "two.csv", jobs=2)
+    assert one.equals(two)
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
+
+
+def test_an_easy_world_ends_right():
+    """Two cans, one person who walks past them, nothing else: map, observe, learn, adapt and perform all succeed."""
+    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
+    cans = [Object.trash_can((2.5, 3.6)), Object.trash_can((6.5, 3.6))]
+    person = Person([(1.6, 2.6), (4.0, 4.4), (6.0, 2.6), (7.6, 3.2)])
+    scene = Scene(cans, people=[person])
+    later = scene.with_objects_at(scene.positions + [(0.2, 0.1), (-0.1, 0.2)])
+    tour = np.array([(4.5, 2.6), (7.6, 2.6), (4.5, 5.0), (1.6, 4.6), (1.6, 2.4)])
+    empty = replace(scene, objects=(), people=())
+    world = SimpleNamespace(seed=1, kind="plain", shape="rectangle", empty=empty, tour=tour,
+                            demonstrations=(scene,), later=later, draws=1)  # fmt: skip
+    assert walk_of(person, scene).t[-1] > 5
+    row = judge(world).row(world)
+    assert row["outcome"] == "right", row
+    assert row["user_right"] > 0.98 and row["found"] == 2 and row["finished"] == 1
