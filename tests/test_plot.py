@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.patches import Circle, Ellipse
+from matplotlib.patches import Circle, Ellipse, Polygon
 from rooms import ANGLES, CANS, WALLS, room_map, scan
 
 from dollop import plot
 from dollop.cdhmm import SubgoalHMM
+from dollop.lab import Object, Person, Scene, walks_of
 from dollop.laser import LaserLog
 
 POSE = np.array([4.5, 1.0, 1.5])
@@ -126,6 +127,18 @@ def test_a_workspace_has_map_robot_and_obstacles_in_metres(ax):
     assert (ax.get_xlabel(), ax.get_ylabel(), ax.get_title()) == ("x [m]", "y [m]", "room")
     assert ax.get_aspect() == 1
     assert labels(ax) == ["obstacles", "robot"]
+
+
+def test_a_scene_shows_what_the_laser_meets_and_who_walks(ax):
+    """Outlines at the beam are where the record has them, a cone's foot is dotted round it, and each walk is there."""
+    walked = Person([(1.0, 3.0), (2.0, 3.0), (2.0, 4.0)])
+    scene = Scene([Object.cone((4.0, 3.0)), Object("box", (6.0, 3.0), (0.4, 0.6), 0.2)], people=[walked])
+    plot.scene(ax, scene, walks_of(scene))
+    outlines = [each.get_xy() for each in ax.patches if isinstance(each, Polygon)]
+    extents = {tuple(np.ptp(each, axis=0).round(2)) for each in outlines}
+    assert {(9.0, 7.0), (0.26, 0.26), (0.56, 0.56), (0.4, 0.6)} <= extents  # room, cone, its foot, a box too low
+    assert labels(ax) == ["objects", "user, in truth", "robot"]
+    np.testing.assert_allclose(ax.lines[0].get_xydata()[-1], (2.0, 4.0), atol=0.2)
 
 
 def test_runs_look_alike_unless_one_is_kidnapped(ax):

@@ -16,10 +16,10 @@ EXTRAS = PROJECT["optional-dependencies"]
 CODE = sorted((ROOT / "dollop").rglob("*.py"))
 DISTRIBUTIONS = {"PIL": "pillow", "yaml": "pyyaml"}  # where the two names differ
 PLACES = {  # where an extra may be imported
-    "lab": "dollop/lab/",
+    "lab": "dollop/lab/engine.py",
     "ros": "dollop/formats/ros_bag.py",
     "baseline": "dollop/replication/baseline.py",
-    "cluster": "dollop/replication/study.py",
+    "cluster": "dollop/replication/running.py",
 }
 LOCK = (ROOT / "environment.txt").read_text().splitlines()
 

@@ -12,7 +12,8 @@ from rooms import figure_eight
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.lab.pioneer import Pioneer
-from dollop.lab.scenes import BACKGROUND, BEAM_HEIGHT, ROOM, empty_scene, figure_eight_scene
+from dollop.lab.rooms import LABORATORY
+from dollop.lab.scenes import BEAM_HEIGHT, empty_scene, figure_eight_scene
 from dollop.lab.world import World
 from dollop.pose import moved_pose
 from dollop.robot.control import PIONEER_LIMITS
@@ -34,7 +35,7 @@ def robot(empty):
     """A Pioneer at rest in the middle of the room."""
     robot = Pioneer(empty, (4.5, 3.0, 0.0), limits=PIONEER_LIMITS._replace(turn=1.75))
     yield robot
-    empty.call("removeBody", robot.body)
+    empty.engine.remove(robot.body)
 
 
 def drive(robot, speed, turn, duration):
@@ -45,7 +46,7 @@ def drive(robot, speed, turn, duration):
 
 def velocity(robot):
     """True forward speed in m/s and turning rate in rad/s of the middle of the axle."""
-    (vx, vy, _), (_, _, turn) = robot.world.call("getBaseVelocity", robot.body)
+    (vx, vy, _), (_, _, turn) = robot.world.engine.velocity(robot.body)
     theta = robot.true_pose[2]
     return vx * np.cos(theta) + vy * np.sin(theta), turn
 
@@ -103,9 +104,9 @@ def test_a_collision_is_felt(robot):
 @pytest.fixture(scope="module")
 def background():
     """The laboratory's map as drawn, at the height of the laser."""
-    x, y = (np.arange(-0.1, size + 0.1 - 1e-9, 0.05) + 0.025 for size in ROOM)
+    x, y = (np.arange(-0.1, size + 0.1 - 1e-9, 0.05) + 0.025 for size in LABORATORY.bounds[2:])
     x, y = np.meshgrid(x, y)
-    parts = [p.bounds for p in BACKGROUND if abs(p.centre[2] - BEAM_HEIGHT) < p.size[2] / 2]
+    parts = [part.outline.bounds for part in LABORATORY.parts if part.reaches(BEAM_HEIGHT)]
     blocked = np.zeros(x.shape, dtype=bool)
     for a, b, c, d in parts:
         blocked |= (x > a - 0.02) & (x < c + 0.02) & (y > b - 0.02) & (y < d + 0.02)

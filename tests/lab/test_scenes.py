@@ -1,78 +1,74 @@
-"""The scenes, the walks and the recordings on disk: what of the laboratory needs no PyBullet."""
+"""Scenes: what stands where, what is refused, and that a scene is data that comes back as it was."""
+
+import copy
+import json
+from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from random_scenes import SCANNERS, random_scene
 
 from dollop.formats.files import FormatError
-from dollop.lab import (
-    Recording,
+from dollop.lab.outlines import outline_distances
+from dollop.lab.rooms import LABORATORY, Part, Room
+from dollop.lab.scanner import Scanner, SickLMS200
+from dollop.lab.scenes import (
+    BEAM_HEIGHT,
+    Move,
+    Object,
+    Person,
+    Robot,
     Scene,
-    figure_eight,
+    empty_scene,
     figure_eight_scene,
     moved,
+    object_gaps,
     rearranged,
-    slalom,
     slalom_scene,
-    walk,
 )
-from dollop.lab.person import BACKGROUND_CLEARANCE, CLEARANCE, SHOULDERS, arc_length
-from dollop.lab.scenes import BACKGROUND_BOXES, ROOM, background_distance, box_distance
-from dollop.laser import LaserLog
 
 SEEDS = range(12)
+HALL = Scene(room=Room([(0, 0), (8, 0), (8, 6), (0, 6)], [Part("box", (7.5, 5.5, 0.5), (0.8, 0.8, 1.0))]))
+CAN, OTHER_CAN = Object.trash_can((2.0, 3.0)), Object.trash_can((4.0, 3.0))
+CANS = replace(HALL, objects=[CAN, OTHER_CAN])
 
 
-def turns(walk, centre):
-    """Signed number of times that a walk goes round a point."""
-    away = walk.positions - centre
-    return np.diff(np.unwrap(np.arctan2(away[:, 1], away[:, 0]))).sum() / (2 * np.pi)
+# ---- what stands where
 
 
-def shoulder_room(walk, scene):
-    """Least distance between shoulder and foreground object."""
-    gaps = np.linalg.norm(walk.positions[:, None] - scene.positions, axis=2) - scene.foot_radii
-    return gaps.min() - SHOULDERS / 2
+def test_the_laser_meets_cans_and_cones_as_round_as_they_are_there():
+    """A can is 36 cm wide up to 66 cm, a cone narrows from 38 cm at the floor to 4 cm at 1 m; higher there is none."""
+    can, cone = Object.trash_can((1.0, 2.0)), Object.cone((1.0, 2.0))
+    assert [can.outline(height).radius for height in (0.1, 0.36, 0.65)] == pytest.approx([0.18] * 3)
+    assert [cone.outline(height).radius for height in (1e-9, 0.5, 1 - 1e-9)] == pytest.approx([0.1912, 0.1062, 0.0212])
+    assert can.outline(0.66) is None and cone.outline(1.0) is None
+    assert (cone.reach, cone.footprint.radius, can.reach) == (0.28, 0.28, 0.18)
 
 
-def test_box_distance_is_the_distance_to_the_nearest_sampled_point():
-    """The distance to boxes equals the one to the nearest of many points on them."""
-    rng = np.random.default_rng(0)
-    boxes = np.array([[0.0, 0.0, 1.0, 2.0], [3.0, 1.0, 3.5, 4.0]])
-    points = rng.uniform(-1, 5, (50, 2))
-    grid = []
-    for a, b, c, d in boxes:
-        x, y = np.meshgrid(np.linspace(a, c, 200), np.linspace(b, d, 200))
-        grid.append(np.column_stack([x.ravel(), y.ravel()]))
-    grid = np.concatenate(grid)
-    brute = np.linalg.norm(points[:, None] - grid, axis=2).min(axis=1)
-    assert np.allclose(box_distance(points, boxes), brute, atol=0.02)
+def test_a_box_reaches_to_its_corners():
+    """Turned, its outline is the same at any height, and its reach half its diagonal."""
+    box = Object("box", (1.0, 2.0), (0.6, 0.8), 0.5, turn=0.7)
+    assert box.reach == pytest.approx(0.5)
+    assert box.outline(0.1) == box.outline(0.49) == box.footprint == (1.0, 2.0, 0.3, 0.4, 0.7, 0.0)
 
 
-def test_the_room_encloses_all_furniture():
-    """No furniture stands through a wall, and the room is nine metres by seven."""
-    furniture = BACKGROUND_BOXES[4:]
-    assert ROOM == (9.0, 7.0)
-    assert np.all(furniture[:, :2] >= 0) and np.all(furniture[:, 2:] <= ROOM)
+def test_boxes_are_of_what_the_laser_meets():
+    """The true bounding boxes are of the objects as high as the beam, in their order; a lower one has none."""
+    low = Object("box", (2.0, 1.0), (0.4, 0.4), BEAM_HEIGHT - 0.01)
+    scene = replace(HALL, objects=[Object("box", (6.0, 3.0), (0.6, 0.8), 0.5, np.pi / 2), low, Object.cone((2.0, 3.0))])
+    expected = [(5.6, 2.7, 6.4, 3.3), (1.87, 2.87, 2.13, 3.13)]
+    assert scene.boxes == pytest.approx(np.array(expected)) and scene.foot_radii == pytest.approx(
+        [0.5, 0.2828, 0.28], abs=1e-4
+    )
+    assert empty_scene().boxes.shape == (0, 4)
 
 
-@pytest.mark.parametrize(
-    ("kinds", "positions", "message"),
-    [
-        (("bucket",), [(4.0, 3.0)], "kind must be one of"),
-        (("cone",), [(0.3, 3.0)], "clear of everything"),
-        (("cone", "cone"), [(4.0, 3.0), (4.3, 3.0)], "clear of everything"),
-        (("cone",), [(20.0, 20.0)], "clear of everything"),
-        (("cone",), [(np.nan, 3.0)], "clear of everything"),
-        (("cone", "cone"), [(4.0, 3.0)], "one position per kind"),
-    ],
-)
-def test_a_scene_that_cannot_stand_is_refused(kinds, positions, message):
-    """Unknown kinds, objects too near to anything, outside or without position raise ValueError."""
-    with pytest.raises(ValueError, match=message):
-        Scene(kinds, positions)
+def test_objects_may_stand_against_walls_furniture_and_each_other():
+    """A millimetre of room is enough, for a turned box too."""
+    cans = [Object.trash_can(place) for place in [(0.181, 3.0), (0.542, 3.0), (6.919, 5.5)]]
+    carton = Object("box", (4.0, 5.999 - np.sqrt(0.5)), (1.0, 1.0), 0.5, turn=np.pi / 4)
+    scene = replace(HALL, objects=[*cans, carton])
+    assert object_gaps(scene)[:3] == pytest.approx([0.001] * 3, abs=1e-6)
 
 
 def test_moved_and_rearranged_scenes_keep_objects_and_room():
@@ -82,151 +78,263 @@ def test_moved_and_rearranged_scenes_keep_objects_and_room():
     assert np.allclose(moved(scene, shifts).positions - scene.positions, shifts)
     for seed in SEEDS:
         other = rearranged(scene, np.random.default_rng(seed))
-        assert other.kinds == scene.kinds
-        assert np.all(background_distance(other.positions) - other.foot_radii >= 1.0)
-    with pytest.raises(ValueError, match="spacing must leave room"):
+        assert [replace(each, position=(0, 0)) for each in other.objects] == [Object.trash_can((0, 0))] * 2
+        assert np.all(LABORATORY.distance(other.positions) - other.foot_radii >= 1.0)
+        assert np.all(object_gaps(other) >= 1.0)
+        assert np.all(np.linalg.norm(other.positions - scene.robot.pose[:2], axis=1) - other.foot_radii >= 1.0)
+    with pytest.raises(ValueError, match="spacing must leave room for 2 objects, found none for 5.0 m"):
         rearranged(scene, np.random.default_rng(0), spacing=5.0, attempts=10)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_figure_eight_keeps_clear_of_objects_and_background(seed):
-    """The shoulder never comes nearer than 0.10 m to a can and 0.30 m to the background."""
-    scene = figure_eight_scene()
-    walk = figure_eight(scene, seed, laps=2)
-    assert shoulder_room(walk, scene) > CLEARANCE - 1e-9
-    assert background_distance(walk.positions).min() - SHOULDERS / 2 >= BACKGROUND_CLEARANCE
+def test_a_slalom_stands_in_a_row():
+    """Cones stand as far apart as told, in the middle of the room; a row too long for it is refused."""
+    x, y = slalom_scene(3, spacing=1.2).positions.T
+    assert np.diff(x) == pytest.approx(1.2) and x.mean() == pytest.approx(4.5) and np.ptp(y) == 0.0
+    with pytest.raises(ValueError, match=r"object 0 must stand in the room and free, got \(-0.75, 3.6\)"):
+        slalom_scene(8)
 
 
-@pytest.mark.parametrize(("first_turn", "sense"), [("left", 1), ("right", -1)])
-def test_a_figure_eight_goes_round_both_cans_in_the_sense_asked_for(first_turn, sense):
-    """Two laps wind twice round each can, in opposite senses."""
-    scene = figure_eight_scene()
-    walk = figure_eight(scene, 3, laps=2, first_turn=first_turn)
-    first, second = (turns(walk, centre) for centre in scene.positions)
-    assert second == pytest.approx(2 * sense, abs=0.3)
-    assert first == pytest.approx(-2 * sense, abs=0.3)
+def test_the_laser_is_ahead_of_the_axle():
+    """Its pose is the robot's, moved ahead in the direction that it faces."""
+    robot = Robot((1.0, 2.0, np.pi / 2), laser_ahead=0.1)
+    assert robot.laser_pose == pytest.approx([1.0, 2.1, np.pi / 2])
 
 
-def test_figure_eights_are_about_17_metres_long_and_never_the_same():
-    """A lap is near 17.5 m long, and points of two laps differ by centimetres, not metres."""
-    walk = figure_eight(figure_eight_scene(), 0, laps=5)
-    arc = arc_length(walk.positions)
-    assert arc[-1] / 5 == pytest.approx(17.5, abs=0.7)
-    moving = walk.positions[(arc > 1) & (arc < arc[-1] - 1)]
-    first, third = moving[: len(moving) // 5], moving[2 * len(moving) // 5 : 3 * len(moving) // 5]
-    nearest = np.linalg.norm(first[::10, None] - third, axis=2).min(axis=1)
-    assert 0.02 < nearest.mean() < 0.2
+# ---- what cannot be
+
+BAD_OBJECTS = [
+    ({"shape": "bucket"}, "shape must be one of 'box', 'cylinder', 'cone', got 'bucket'"),
+    ({"position": (np.nan, 3.0)}, "position must be finite, got nan"),
+    ({"position": (1.0, 2.0, 3.0)}, r"position must have shape \(2,\), got \(3,\)"),
+    ({"size": (0.0, 1.0)}, "size must be positive and finite, got 0.0"),
+    ({"height": -1.0}, "height must be positive and finite, got -1.0"),
+    ({"turn": np.nan}, "turn must be finite, got nan"),
+    ({"top": -0.1}, "top must be finite and not negative, got -0.1"),
+    ({"shape": "cone", "size": (0.2, 0.3)}, r"a cone must be as deep as wide, got \(0.2, 0.3\)"),
+]
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_speed_is_human(seed):
-    """A walk starts and ends at rest, and goes at about a metre per second on the way."""
-    walk = figure_eight(figure_eight_scene(), seed, laps=2)
-    speeds = walk.speeds
-    assert speeds[0] < 0.02 and speeds[-1] < 0.02
-    on_the_way = speeds[(walk.t > 4) & (walk.t < walk.t[-1] - 4)]
-    assert on_the_way.min() > 0.6 and on_the_way.max() < 1.4
-    acceleration = np.abs(np.gradient(speeds, walk.t))
-    assert acceleration.max() < 1.5
+@pytest.mark.parametrize(("parts", "rule"), BAD_OBJECTS)
+def test_an_object_that_cannot_be_is_refused(parts, rule):
+    """An unknown shape, and numbers that are none or out of range, raise ValueError that names them."""
+    with pytest.raises(ValueError, match=rule):
+        Object(**({"shape": "box", "position": (1.0, 1.0), "size": (1.0, 1.0), "height": 1.0} | parts))
 
 
-def test_curves_are_walked_slower():
-    """Over many walks the speed in the lobes is at least 5 % below the one at the crossing."""
-    middle, lobes = [], []
-    for seed in SEEDS:
-        walk = figure_eight(figure_eight_scene(), seed, laps=2)
-        moving = (walk.t > 4) & (walk.t < walk.t[-1] - 4)
-        aside = np.abs(walk.positions[:, 0] - 4.5)
-        middle.append(walk.speeds[moving & (aside < 0.8)].mean())
-        lobes.append(walk.speeds[moving & (aside > 2.5)].mean())
-    assert np.mean(lobes) < 0.95 * np.mean(middle)
+BAD_ROBOTS = [
+    ({"pose": (1.0, 1.0)}, r"the robot's pose must have shape \(3,\), got \(2,\)"),
+    ({"pose": (1.0, np.nan, 0.0)}, "the robot's pose must be finite, got nan"),
+    ({"way": [(1.0, np.inf)]}, "the robot's way must be finite, got .*inf"),
+    ({"speed": 0.0}, "the robot's speed must be positive and finite, got 0.0"),
+    ({"radius": np.nan}, "the robot's radius must be positive and finite, got nan"),
+    ({"laser_ahead": np.nan}, "laser_ahead must be finite, got nan"),
+    ({"beam_height": 1.4}, "below people's shoulders, 1.4 m, got 1.4 m"),
+    ({"beam_height": 0.0}, "over the floor .*, got 0.0 m"),
+    ({"beam_height": np.nan}, "over the floor .*, got nan m"),
+]
 
 
-def test_the_same_seed_walks_the_same_walk():
-    """A walk is determined by its seed, and another seed walks differently."""
-    scene = figure_eight_scene()
-    one, same, other = (figure_eight(scene, seed, laps=1) for seed in (5, 5, 6))
-    assert np.array_equal(one.positions, same.positions)
-    assert np.array_equal(one.headings, same.headings)
-    assert not np.allclose(one.positions[:200], other.positions[:200])
+@pytest.mark.parametrize(("parts", "rule"), BAD_ROBOTS)
+def test_a_robot_that_cannot_be_is_refused(parts, rule):
+    """A beam over everything or in the floor, and numbers that are none, raise ValueError that names them."""
+    with pytest.raises(ValueError, match=rule):
+        Robot(**parts)
 
 
-@settings(max_examples=15)
-@given(seed=st.integers(0, 2**16), sides=st.lists(st.sampled_from([-1, 1]), min_size=4, max_size=4))
-def test_a_slalom_passes_every_cone_on_its_side(seed, sides):
-    """Where the walker is abreast of a cone it is on the side asked for, and clear of it."""
-    scene = slalom_scene(4)
-    walk = slalom(scene, seed, sides)
-    assert shoulder_room(walk, scene) > CLEARANCE - 1e-9
-    for (x, y), side in zip(scene.positions, sides, strict=True):
-        abreast = np.argmin(np.abs(walk.positions[:, 0] - x))
-        assert np.sign(walk.positions[abreast, 1] - y) == side
+LOW = Room([(0, 0), (8, 0), (8, 6), (0, 6)], height=1.0)
+MOVED_FIRST = [Move(1, 0.0, (6.0, 3.0)), Move(0, 2.0, (4.0, 3.0))]
+BAD_SCENES = [
+    ({"objects": [Object.cone((20.0, 20.0))]}, r"object 0 must stand in the room and free, got \(20.0, 20.0\)"),
+    ({"objects": [Object.cone((0.2, 3.0))]}, r"object 0 must stand in the room and free, got \(0.2, 3.0\)"),
+    ({"objects": [CAN, Object.cone((7.5, 5.5))]}, r"object 1 must stand in the room and free, got \(7.5, 5.5\)"),
+    ({"objects": [CAN, Object.cone((2.3, 3.0))]}, r"object 0 at \(2.0, 3.0\) and object 1 at \(2.3, 3.0\)"),
+    ({"objects": [Object("box", (4.5, 1.0), (2, 2), 1)]}, r"the robot must not be in an object, got \(4.5, 0.6\)"),
+    ({"robot": Robot((4.0, 0.1, 0.0))}, r"the robot must stand in the room and free, got \(4.0, 0.1\)"),
+    ({"robot": Robot(way=[(2.0, 3.1)])}, r"the robot's way must not be in an object, got \(2.0, 3.1\) and object 0"),
+    ({"robot": Robot(way=[(9.0, 3.0)])}, r"the robot's way must stand in the room and free, got \(9.0, 3.0\)"),
+    ({"room": LOW, "robot": Robot(beam_height=1.1)}, r"below the top of the walls, 1.0 m, got 1.1 m"),
+    ({"people": [Person([(1, 1), (9, 1)])]}, r"person 0 must walk in the room, got \(9.0, 1.0\)"),
+    ({"people": [Person([(1, 1)]), Person([(7.5, 5.5)])]}, r"person 1 must walk in the room, got \(7.5, 5.5\)"),
+    (
+        {"people": [Person([(1, 1), (3, 1)]), Person([(1.3, 1), (1, 3)])]},
+        "people must begin 0.45 m apart or more, got 0.30 m between person 0 and person 1",
+    ),
+    ({"moves": [Move(2, 0.0, (6, 3))]}, "a move must be of one of 2 objects, got object 2"),
+    ({"moves": [Move(-1, 0.0, (6, 3))]}, "a move must be of one of 2 objects, got object -1"),
+    ({"moves": [Move(0.5, 0.0, (6, 3))]}, "a move must be of one of 2 objects, got object 0.5"),
+    ({"moves": [Move(0, 0.0, (9, 3))]}, r"object 0, when moved, must stand in the room and free, got \(9.0, 3.0\)"),
+    ({"moves": [Move(0, 0.0, (7.5, 5.5))]}, r"object 0, when moved, must stand in the room and free"),
+    ({"moves": [Move(0, 0.0, (4.2, 3.0))]}, r"not stand in anything, got \(4.2, 3.0\), in what is at \(4.0, 3.0\)"),
+    ({"moves": [Move(0, 0.0, (4.6, 0.7))]}, r"not stand in anything, got \(4.6, 0.7\), in what is at \(4.5, 0.6\)"),
+    ({"moves": [*MOVED_FIRST, Move(1, 3.0, (4, 3.2))]}, r"object 1, when moved, .* in what is at \(4.0, 3.0\)"),
+]
 
 
-def test_walks_round_moved_objects_keep_clear():
-    """A figure-eight follows its cans wherever there is room for it."""
-    scene = moved(figure_eight_scene(), [(0.3, 0.4), (-0.2, -0.4)])
-    walk = figure_eight(scene, 1, laps=1)
-    assert shoulder_room(walk, scene) > CLEARANCE - 1e-9
-    assert turns(walk, scene.positions[1]) == pytest.approx(1, abs=0.3)
+@pytest.mark.parametrize(("parts", "rule"), BAD_SCENES)
+def test_a_scene_that_cannot_be_is_refused(parts, rule):
+    """What is outside, in something else, over the walls, or none of what is there raises ValueError that says so."""
+    with pytest.raises(ValueError, match=rule):
+        replace(CANS, **parts)
 
 
-def test_impossible_walks_are_refused():
-    """Too few objects, an unknown sense or side, and a path into the furniture raise ValueError."""
-    scene = figure_eight_scene()
-    with pytest.raises(ValueError, match="needs two objects"):
-        figure_eight(slalom_scene(1), 0)
-    with pytest.raises(ValueError, match="first_turn must be"):
-        figure_eight(scene, 0, first_turn="up")
-    with pytest.raises(ValueError, match="sides must be"):
-        slalom(slalom_scene(4), 0, [1, 0, 1, 1])
-    with pytest.raises(ValueError, match=r"must keep 0\.3 m"):
-        walk([(4.5, 3.0), (4.5, 6.5)], scene, 0)
+def test_an_object_may_be_moved_to_where_another_has_left():
+    """What counts is what stands there when the move is done, in whatever order the moves are told."""
+    assert replace(CANS, moves=MOVED_FIRST).moves == tuple(MOVED_FIRST)
+    assert replace(CANS, moves=MOVED_FIRST[::-1]).moves == tuple(MOVED_FIRST[::-1])
 
 
-def test_walk_at_holds_its_ends():
-    """Before and after the walk the person stands at its ends."""
-    walk = figure_eight(figure_eight_scene(), 0, laps=1)
-    assert np.array_equal(walk.at(-1.0)[0], walk.positions[0])
-    assert np.array_equal(walk.at(1e3)[0], walk.positions[-1])
+# ---- a scene is data
 
 
-def small_recording():
-    """Two scans of three beams."""
-    ranges = np.array([[1.0, 2.5, np.inf], [1.001, 2.5, 3.0]])
-    t, poses = np.array([0.0, 0.1]), np.tile([4.5, 0.617, 1.5], (2, 1))
-    log = LaserLog(t, ranges, np.deg2rad([-90.0, 0.0, 90.0]), poses, 8.191)
-    way = {"x": [1.0, 1.1], "y": [2.0, 2.0], "heading": [0.0, 0.25]}
-    truth = pd.DataFrame({"t": t, **way})
-    return Recording(log, truth, figure_eight_scene())
+def through_json(content):
+    """What is left of plain lists and numbers when they were written down and read again."""
+    return json.loads(json.dumps(content))
 
 
-@pytest.mark.parametrize("name", ["eights.log", "eights.log.gz"])
-def test_a_recording_reads_back_what_it_wrote(tmp_path, name):
-    """Log, truth and scene come back equal."""
-    recording = small_recording()
-    recording.save(tmp_path / name)
-    assert (tmp_path / "eights_truth.csv").exists() and (tmp_path / "eights_scene.json").exists()
-    back = Recording.load(tmp_path / name)
-    assert np.array_equal(back.log.ranges, recording.log.ranges)
-    assert np.allclose(back.log.poses, recording.log.poses, atol=1e-3)
-    pd.testing.assert_frame_equal(back.truth, recording.truth)
-    assert back.scene.to_dict() == recording.scene.to_dict()
+@pytest.mark.parametrize("block", range(4))
+def test_a_scene_comes_back_from_json_as_it_was(block):
+    """In random scenes every number is the same, and so are the records that are made of them."""
+    for seed in range(block, 60, 4):
+        scene = random_scene(np.random.default_rng(seed))
+        back = Scene.from_dict(through_json(scene.to_dict()))
+        assert back.to_dict() == scene.to_dict()
+        for name in ("objects", "robot", "people", "moves"):
+            assert getattr(back, name) == getattr(scene, name)
+        assert np.array_equal(back.room.corners, scene.room.corners) and back.room.furniture == scene.room.furniture
+        assert back.section == scene.section
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("eights_truth.csv", "t,x,y,heading\n0.0,1.0,2.0,0.0\n"),
-        ("eights_truth.csv", "t,x,y,heading\n0.0,1.0,2.0,0.0\n0.1,one,2.0,0.0\n"),
-        ("eights_truth.csv", ""),
-        ("eights_scene.json", "{"),
-        ("eights_scene.json", '{"kinds": ["bucket"], "positions": [[4, 3]], "robot": [4, 1, 0]}'),
-    ],
-)
-def test_damaged_companions_are_named(tmp_path, name, text):
-    """A truth of wrong length or content and a broken scene raise FormatError and are named."""
-    small_recording().save(tmp_path / "eights.log")
-    (tmp_path / name).write_text(text)
-    with pytest.raises(FormatError, match=name):
-        Recording.load(tmp_path / "eights.log")
+@pytest.mark.parametrize("seed", range(5))
+def test_a_scene_comes_back_from_its_file(tmp_path, seed):
+    """Saved and loaded, it is the same; a file of its own is JSON that anybody can read."""
+    scene, path = random_scene(np.random.default_rng(seed)), tmp_path / "room.json"
+    scene.save(path)
+    assert Scene.load(path).to_dict() == scene.to_dict() == json.loads(path.read_text())
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"\xff\xfe", b"[1, 2]", b"[" * 100_000, b'{"format": "dollop scene"}'])
+def test_a_damaged_file_is_named(tmp_path, content):
+    """What is no JSON, or no scene, raises FormatError that names the file."""
+    (tmp_path / "room.json").write_bytes(content)
+    with pytest.raises(FormatError, match="room.json: "):
+        Scene.load(tmp_path / "room.json")
+
+
+def full_scene():
+    """A scene with something in every part, as plain lists and numbers."""
+    people = [Person([(1.0, 1.0), (3.0, 1.0)], stops=[(1, 2.0)]), Person([(6.0, 5.0), (5.0, 5.0)], times=[0.0, 1.5])]
+    robot = Robot(scanner=SickLMS200(100, 0.5, "cm"), way=[(5.0, 1.0)])
+    scene = replace(CANS, robot=robot, people=people, moves=[Move(0, 1.0, (3.0, 4.0))])
+    return through_json(scene.to_dict())
+
+
+def numbers(content, path=()):
+    """The way to each number in nested lists and dictionaries."""
+    parts = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
+    for key, part in parts:
+        if isinstance(part, int | float) and not isinstance(part, bool):
+            yield (*path, key)
+        yield from numbers(part, (*path, key))
+
+
+def with_part(content, path, value):
+    """The same with another value at the end of a way."""
+    content = copy.deepcopy(content)
+    inner = content
+    for key in path[:-1]:
+        inner = inner[key]
+    inner[path[-1]] = value
+    return content
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_no_number_is_nan_or_infinite(value):
+    """Wherever in a scene one is put in place of a number, ValueError tells of it."""
+    content, paths = full_scene(), list(numbers(full_scene()))
+    assert len(paths) > 80
+    for path in paths:
+        with pytest.raises(ValueError, match=str(value)):
+            Scene.from_dict(with_part(content, path, value))
+
+
+@pytest.mark.parametrize("value", ["x", None, [], [1.0], {}, {"a": 1}])
+def test_what_is_no_number_is_refused(value):
+    """Wherever something else is put in place of a number, ValueError is raised and no other error."""
+    content = full_scene()
+    for path in numbers(content):
+        if path == ("robot", "scanner", "bias") and value == [1.0]:
+            continue
+        with pytest.raises(ValueError):
+            Scene.from_dict(with_part(content, path, value))
+
+
+DAMAGED = [
+    ({"format": "other scene"}, "not a scene: format must be 'dollop scene'"),
+    ({"format": None}, "not a scene: format must be 'dollop scene'"),
+    ({"version": 2}, "the version of a scene must be 1, got 2"),
+    ({"version": None}, "the version of a scene must be 1, got None"),
+    ({"version": "1"}, "the version of a scene must be 1, got '1'"),
+    ({"room": None}, "a damaged scene: KeyError 'room'"),
+    ({"robot": None}, "a damaged scene: KeyError 'robot'"),
+    ({"objects": None}, "a damaged scene: KeyError 'objects'"),
+    ({"people": None}, "a damaged scene: KeyError 'people'"),
+    ({"moves": None}, "a damaged scene: KeyError 'moves'"),
+    ({"ghosts": []}, "a scene has no ghosts"),
+    ({"objects": [{"shape": "box"}]}, "a damaged scene: TypeError .*'position', 'size', and 'height'"),
+    ({"objects": ["box"]}, "a damaged scene: "),
+    ({"people": [{"places": [[1, 1]], "age": 30}]}, "a damaged scene: TypeError .*'age'"),
+    ({"moves": [{"object": 0, "begin": 1.0}]}, "a damaged scene: TypeError .*'to'"),
+]
+
+
+@pytest.mark.parametrize(("parts", "rule"), DAMAGED)
+def test_what_is_no_scene_is_refused(parts, rule):
+    """Another format or version, a part that is missing (None here) or unknown raise ValueError that names it."""
+    content = full_scene() | parts
+    content = {name: value for name, value in content.items() if value is not None}
+    with pytest.raises(ValueError, match=rule):
+        Scene.from_dict(content)
+
+
+@pytest.mark.parametrize("content", [None, [], "scene", 3.0, {}, {"kinds": ["cone"], "positions": [[4, 3]]}])
+def test_anything_else_is_no_scene(content):
+    """What is no dictionary, or is one of an older time, is not a scene."""
+    with pytest.raises(ValueError, match="not a scene"):
+        Scene.from_dict(content)
+
+
+BAD_SCANNERS = [
+    ({"fov": 170}, "fov/resolution must be one of .* degrees, got 170/0.5"),
+    ({"resolution": 0.125}, "fov/resolution must be one of .* degrees, got 100/0.125"),
+    ({"rate": 10.0}, "rate of a SICK LMS 200 must be 9 in this mode, got 10"),
+    ({"step": 0.002}, "mode must be one of 'mm', 'cm', got '0.002 m'"),
+    ({"max_range": 8.191}, "max_range of a SICK LMS 200 must be 81.91 in this mode, got 8.191"),
+    ({"min_range": 0.1}, "min_range of a SICK LMS 200 must be 0.2 in this mode, got 0.1"),
+    ({"model": "SICK TiM571"}, "fov of a SICK TiM571 must be 270 in this mode, got 100"),
+    ({"missed": 2.0}, "missed must be a probability, got 2"),
+    ({"colour": "blue"}, "a damaged scene: TypeError .*'colour'"),
+]
+
+
+@pytest.mark.parametrize(("parts", "rule"), BAD_SCANNERS)
+def test_a_scanner_on_file_has_one_of_its_own_modes(parts, rule):
+    """A model on offer with a field of view, rate or range that it does not have raises ValueError that names it."""
+    content = full_scene()
+    content["robot"]["scanner"] |= parts
+    with pytest.raises(ValueError, match=rule):
+        Scene.from_dict(content)
+
+
+@pytest.mark.parametrize("scanner", [*SCANNERS, Scanner("my own", 90, 0.1, 12.5, 4.0, 0.1, 0.01, 0.02, missed=0.1)])
+def test_every_scanner_comes_back(scanner):
+    """Those on offer with any errors, and one of somebody's own, are the same after JSON."""
+    scene = Scene(robot=Robot(scanner=scanner))
+    assert Scene.from_dict(through_json(scene.to_dict())).robot.scanner == scanner
+
+
+def test_the_section_is_what_a_plane_cuts():
+    """Cut higher, a desk's top is in it and a stool is not; a point in the section is in something as high as that."""
+    low, high = (Scene(robot=Robot(beam_height=height)).section for height in (0.51, 0.735))
+    on_the_desk, on_the_stool = [(1.5, 6.6)], [(1.2, 5.98)]
+    assert outline_distances(on_the_desk, low).min() > 0 > outline_distances(on_the_desk, high).min()
+    assert outline_distances(on_the_stool, low).min() < 0 < outline_distances(on_the_stool, high).min()
