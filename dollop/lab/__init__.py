@@ -1,9 +1,14 @@
-"""The laboratory, simulated: a room, a Pioneer 2 DX with a SICK LMS 200, and a person who walks.
+"""The laboratory, simulated: any room, what stands in it, people who walk, and a robot with a laser that watches.
 
-    from dollop.lab import record_background, record_figure_eights
-    recording = record_figure_eights(seed=0)  # five laps: .log, .truth (t, x, y, heading), .scene
-    background = record_background(seed=0)    # LaserLog of a drive through the empty laboratory
+    from dollop.lab import Object, Person, Robot, Room, Scene, record, record_background, record_figure_eights
+    recording = record_figure_eights(seed=0)  # the paper's: five laps: .log, .truth (t, x, y, heading), .scene
+    background = record_background(seed=0)    # LaserLog of a drive through the paper's empty laboratory
     recording.save("data/eights.log.gz")      # Recording.load reads it back, without PyBullet
+
+    room = Room([(0, 0), (8, 0), (8, 5), (0, 5)])  # or one of your own; Scene.save and Scene.load write and read
+    user = Person([(1, 4), (4, 2), (7, 4)], speed=0.8, stops=[(1, 2.0)])
+    scene = Scene([Object.trash_can((4, 3))], room, Robot((4, 0.5, 1.57)), [user])
+    recording = record(scene, seed=0)
 
 Scenes, walks, saved recordings and what is only drawn need no PyBullet; what simulates does (extra `lab`), and says so
 when it is missing. A module is imported when one of its names is first asked for.
@@ -16,7 +21,7 @@ from dollop.extras import need
 HOMES = {
     "drawn": ["TASKS", "draw_demonstrations", "random_layouts"],
     "engine": ["Engine"],
-    "people": ["find_way", "read_walks", "walk_of", "walks_of"],
+    "people": ["find_way", "read_walks", "replay", "walk_of", "walks_of"],
     "person": ["Walk", "figure_eight", "slalom", "walk"],
     "pioneer": ["Pioneer"],
     "recording": ["Recording"],

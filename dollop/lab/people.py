@@ -12,10 +12,16 @@ from scipy.sparse.csgraph import dijkstra
 
 from dollop.formats.files import FormatError
 from dollop.lab.outlines import outline_distances
-from dollop.lab.person import DEPTH, SHOULDERS, TIME_STEP, Walk, walk, walk_along
+from dollop.lab.person import DEPTH, SHOULDERS, TIME_STEP, Walk, check_room, walk, walk_along
+from dollop.lab.scenes import Person
+from dollop.pose import rotation
 
-__all__ = ["find_way", "free_places", "read_walks", "walk_of", "walks_of"]
+__all__ = ["find_way", "free_places", "read_walks", "replay", "walk_of", "walks_of"]
 
+STRETCH = 0.7
+"""Longest distance in m between the via-points of a way."""
+AFTERWARDS = 1.5
+"""Time in s that people stand at the end of their way."""
 CELL = 0.10
 """Side in m of the cells in which a way is sought."""
 FRAMES_PER_SECOND = 29.97
@@ -54,31 +60,41 @@ def walk_of(person, scene):
     """
     places = np.array(person.places)
     if len(places) == 1:
+        check_room(places, scene)
         here = np.repeat(places, 2, axis=0)
         return Walk(np.array([0.0, TIME_STEP]), here, np.zeros(2), np.zeros(2), person.body)
     if person.times:
         moving = walk_along(np.array(person.times) - person.times[0], places, person.body)
+        check_room(moving.positions, scene)
         return standing_before(moving, person.begin)
     rng = np.random.default_rng(person.seed)
-    order = visits(len(places), person.laps, person.back)
-    points = places[order] + rng.normal(0.0, person.scatter, (len(order), 2)) * (person.scatter > 0)
-    stops = [(i, seconds) for i, visited in enumerate(order) for k, seconds in person.stops if k == visited]
-    gait = {"speed": person.speed, "stand": person.begin, "body": person.body, "stops": stops}
+    points, numbers = closely(places[visits(places, person.laps, person.back)])
+    visited = np.array(visits(places, person.laps, person.back))
+    points = points + rng.normal(0.0, person.scatter, points.shape) * (person.scatter > 0)
+    stops = [(int(numbers[i]), seconds) for k, seconds in person.stops for i in np.flatnonzero(visited == k)]
+    gait = {"speed": person.speed, "stand": (person.begin, AFTERWARDS), "body": person.body, "stops": stops}
     return walk(points, scene, rng, **gait)
 
 
-def visits(count, laps, back):
-    """The order in which so many places are visited, their numbers."""
+def visits(places, laps, back):
+    """The order in which places (K, 2) are visited, their numbers; one after another are not in one place."""
+    count = len(places)
     once = [*range(count), *range(count - 2, -1, -1)] if back else [*range(count)]
-    if laps == 1:
-        return once
-    lap = once[:-1] if back else once
-    return lap * laps + [0]
+    order = once if laps == 1 else once * laps + [0]
+    return [k for i, k in enumerate(order) if i == 0 or not np.array_equal(places[k], places[order[i - 1]])]
+
+
+def closely(points):
+    """Points (M, 2) on the straight lines between points (K, 2), so close that no spline swings; where those are."""
+    stretches = np.maximum(1, np.ceil(np.linalg.norm(np.diff(points, axis=0), axis=1) / STRETCH - 1e-6)).astype(int)
+    numbers = np.concatenate([[0], np.cumsum(stretches)])
+    filled = [np.interp(np.arange(numbers[-1] + 1), numbers, axis) for axis in points.T]
+    return np.column_stack(filled), numbers
 
 
 def standing_before(moving, seconds):
-    """A walk that begins so many s later, and ends with 1.5 s of standing."""
-    before, after = round(seconds / TIME_STEP), round(1.5 / TIME_STEP)
+    """A walk that begins so many s later, and ends with standing."""
+    before, after = round(seconds / TIME_STEP), round(AFTERWARDS / TIME_STEP)
     padded = [np.pad(each, [(before, after)] + [(0, 0)] * (each.ndim - 1), mode="edge") for each in columns(moving)]
     return Walk(np.arange(len(padded[0])) * TIME_STEP, *padded, moving.body)
 
@@ -102,8 +118,8 @@ def walks_of(scene):
     Raises
     ------
     ValueError
-        As `walk_of`, and if two people, or a person and a robot that stands, are in one place at one
-        time.
+        As `walk_of`, and if two people, or a person and a robot that stands or an object that has been
+        moved, are in one place at one time.
     """
     walks = tuple(walk_of(person, scene) for person in scene.people)
     if not walks:
@@ -116,6 +132,10 @@ def walks_of(scene):
         if not scene.robot.way:
             away = np.linalg.norm(way - scene.robot.pose[:2], axis=1)
             check_apart(away, DEPTH / 2 + scene.robot.radius, t, f"person {i} and the robot")
+        for move in scene.moves:
+            there = scene.objects[move.object].at(move.to).footprint
+            away = np.where(t < move.begin, np.inf, outline_distances(way, [there])[:, 0])
+            check_apart(away, DEPTH / 2, t, f"person {i} and object {move.object}, when moved,")
     return walks
 
 
@@ -136,7 +156,7 @@ def find_way(scene, places, clear=0.15):
     places : (K, 2) array_like
         In m.
     clear : float
-        Distance in m that a shoulder is to keep from everything.
+        Distance in m that a shoulder is to keep from everything; a short cut may come a fifth nearer.
 
     Returns
     -------
@@ -167,7 +187,10 @@ def find_way(scene, places, clear=0.15):
     for place in places[~free_places(scene, places, clear)]:
         raise ValueError(f"a person needs room at every place, found none at {np.round(place, 2).tolist()}")
     graph = neighbours(free.reshape(shape))
-    numbers = np.clip((places - low) // CELL, 0, shape - 1).astype(int) @ [shape[1], 1]
+    flat = np.flatnonzero(free)
+    if not len(flat):
+        raise ValueError(f"a person needs room to walk, found none in {scene.room}")
+    numbers = flat[[np.linalg.norm(cells.reshape(-1, 2)[flat] - place, axis=1).argmin() for place in places]]
     way = [places[0]]
     for k, (begin, end) in enumerate(zip(numbers[:-1], numbers[1:], strict=True)):
         _, before = dijkstra(graph, indices=begin, return_predecessors=True)
@@ -235,6 +258,42 @@ def free_line(scene, begin, end, clear, step=0.05):
     """Whether a person has room all along a straight line."""
     count = max(2, round(np.linalg.norm(end - begin) / step))
     return bool(free_places(scene, np.linspace(begin, end, count), clear * 0.8).all())
+
+
+def replay(track, start, heading, **more):
+    """A person who walks as somebody really did, elsewhere.
+
+    Parameters
+    ----------
+    track : (N, 3) array_like
+        t in s, x and y in m: one of `read_walks`.
+    start : (2,) sequence of float
+        Where the walk is to begin, in m.
+    heading : float
+        Direction from its beginning to its end, in rad.
+    **more
+        More fields of `Person`: body, begin.
+
+    Returns
+    -------
+    Person
+
+    Raises
+    ------
+    ValueError
+        As `Person`.
+
+    Examples
+    --------
+    >>> person = replay([(0.0, 5.0, 5.0), (1.0, 5.0, 6.0)], start=(1.0, 2.0), heading=0.0)
+    >>> np.round(person.places, 6).tolist(), person.times
+    ([[1.0, 2.0], [2.0, 2.0]], (0.0, 1.0))
+    """
+    t, *way = np.asarray(track, dtype=float).T
+    away = np.transpose(way) - np.array(way)[:, 0]
+    turn = heading - np.arctan2(*away[-1, ::-1])
+    places = start + away @ rotation(turn).T
+    return Person(tuple(map(tuple, places.tolist())), times=tuple((t - t[0]).tolist()), **more)
 
 
 def read_walks(folder):

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
+from dollop.checks import checked_positions
 from dollop.lab.outlines import nearest_core, outline_distances
 from dollop.trajectory import arc_length, resample
 
@@ -21,6 +22,7 @@ __all__ = [
     "TIME_STEP",
     "Walk",
     "body_offsets",
+    "check_room",
     "figure_eight",
     "slalom",
     "smooth_path",
@@ -237,7 +239,7 @@ def walk(
         Standard deviation in m of the slow lateral drift off the smooth path.
     sway : float
         Amplitude in m of the lateral sway with every stride.
-    stand : float
+    stand : float or (float, float)
         Time in s stood still before and after.
     body : str
         "torso" or "legs".
@@ -267,12 +269,15 @@ def walk(
     True
     """
     rng = np.random.default_rng(seed)
-    points = np.asarray(points, dtype=float)
+    points = checked_positions("the via-points of a walk", points)
+    if len(points) < 2 or not np.diff(points, axis=0).any(axis=1).all():
+        raise ValueError(f"a walk needs two via-points or more, none twice in a row, got {points.tolist()}")
     path = smooth_path(points)
     path = path + left_of(tangents(path)) * wander(len(path), 1.5 / PATH_STEP, drift, rng)[:, None]
     path = evenly(keep_clear(path, scene))
-    pauses = [(0.0, stand), *((passed(path, points, k), seconds) for k, seconds in stops)]
-    distance = travelled(speed_profile(path, speed, rng, pauses), pauses, stand)
+    before, after = np.broadcast_to(stand, 2)
+    pauses = [(0.0, before), *((passed(path, points, k), seconds) for k, seconds in stops)]
+    distance = travelled(speed_profile(path, speed, rng, pauses), pauses, after)
     positions, headings = along_path(path, distance)
     phases = gait_phases(distance)
     fade = np.clip(np.gradient(distance, TIME_STEP) / speed, 0.0, 1.0)
@@ -460,8 +465,22 @@ def gait_phases(distance):
     return np.cumsum(2 * np.pi * STRIDE_RATE * np.sqrt(speeds) * TIME_STEP)
 
 
-def check_room(positions, scene, from_background):
-    """Raise ValueError where a walk leads through an object or comes too near to the background."""
+def check_room(positions, scene, from_background=0.0):
+    """Refuse a walk that leads through an object or comes too near to the background.
+
+    Parameters
+    ----------
+    positions : (N, 2) float array
+        In m.
+    scene : Scene
+    from_background : float
+        Least distance in m between shoulder and background.
+
+    Raises
+    ------
+    ValueError
+        With the place.
+    """
     room = scene.room.distance(positions) - SHOULDERS / 2
     nearest = np.argmin(room)
     if room[nearest] < from_background:

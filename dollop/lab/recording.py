@@ -3,14 +3,13 @@
 On disk: a CARMEN log, the truth as CSV, the scene as JSON. Nothing here needs PyBullet.
 """
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from dollop.formats.files import FormatError, from_file, whole_file
+from dollop.formats.files import FormatError, whole_file
 from dollop.formats.logs import read_log, write_log
 from dollop.lab.scenes import Scene
 from dollop.laser import LaserLog
@@ -61,8 +60,7 @@ class Recording:
         truth, scene = companions(path)
         with whole_file(truth, "w") as stream:
             self.truth.to_csv(stream, index=False, float_format="%.4f")
-        with whole_file(scene, "w") as stream:
-            json.dump(self.scene.to_dict(), stream, indent=1)
+        self.scene.save(scene)
 
     @classmethod
     def load(cls, path):
@@ -84,7 +82,7 @@ class Recording:
         """
         log = read_log(path)
         truth_path, scene_path = companions(path)
-        return cls(log, load_truth(truth_path, len(log)), load_scene(scene_path))
+        return cls(log, load_truth(truth_path, len(log)), Scene.load(scene_path))
 
 
 def load_truth(path, n_scans):
@@ -100,15 +98,6 @@ def load_truth(path, n_scans):
         got = f"got {', '.join(map(str, truth.columns))} and {len(truth)}"
         raise FormatError(f"{rule}, or none if nothing moves, {got}", path)
     return truth
-
-
-def load_scene(path):
-    """Read a scene from JSON."""
-    try:
-        content = json.loads(Path(path).read_text())
-    except (ValueError, RecursionError) as error:
-        raise FormatError(f"not a scene: {error}", path) from error
-    return from_file(path, Scene.from_dict, content)
 
 
 def companions(path):

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_array, put_in
+from dollop.checks import check_choice, check_positive, checked_array, checked_positions, put_in
 from dollop.lab.outlines import Outline, crosses_itself, gaps, inside, outline_distances, wall_distances
 
 __all__ = ["GREY", "LABORATORY", "OAK", "Part", "Room", "STEEL", "WALL_THICKNESS", "WHITE", "panel", "walls"]
@@ -54,6 +54,8 @@ class Part:
         for name in ("centre", "size", "colour"):
             object.__setattr__(self, name, tuple(checked_array(name, getattr(self, name), 3).tolist()))
         check_positive("size", min(self.size))
+        if self.shape == "cylinder" and self.size[0] != self.size[1]:
+            raise ValueError(f"a cylinder must be as deep as wide, got {self.size[:2]}")
         checked_array("turn", [self.turn], 1)
 
     @property
@@ -110,7 +112,7 @@ class Room:
     height: float = 2.4
 
     def __post_init__(self):
-        corners = checked_array("corners", self.corners, "K", 2)
+        corners = checked_positions("the corners of a room", self.corners)
         if len(corners) < 3:
             raise ValueError(f"a room needs three corners or more, got {len(corners)}")
         check_positive("the height of a room", self.height)
@@ -121,9 +123,11 @@ class Room:
         crossing = crosses_itself(corners)
         if crossing:
             raise ValueError(f"the walls of a room must not cross, got walls {crossing[0]} and {crossing[1]}")
-        x, y = corners.T
-        if x @ np.roll(y, -1) < y @ np.roll(x, -1):
+        area = twice_the_area(corners)
+        if area < 0:
             corners = corners[::-1].copy()
+        check_positive("the floor of a room", abs(area) / 2)
+        check_corners(corners)
         put_in(self, corners=corners, furniture=tuple(self.furniture), height=float(self.height))
         for part in self.furniture:
             if not inside(np.array([part.centre[:2]]), corners)[0]:
@@ -189,6 +193,30 @@ class Room:
         return np.clip(outline_distances(points, furniture).min(axis=1), 0.0, to_walls)
 
 
+def twice_the_area(corners):
+    """Twice the area of a polygon (K, 2) in m^2, negative if its corners go round clockwise."""
+    x, y = corners.T
+    return x @ np.roll(y, -1) - y @ np.roll(x, -1)
+
+
+def directions(corners):
+    """Lengths (K,) in m of the walls from each corner to the next, their directions (K, 2), and those before."""
+    along = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(along, axis=1)
+    along = along / lengths[:, None]
+    return lengths, along, np.roll(along, 1, axis=0)
+
+
+def check_corners(corners):
+    """No wall reaches into the floor: outside of a re-entrant corner there is a right angle or more."""
+    _, along, arriving = directions(corners)
+    turn = arriving[:, 0] * along[:, 1] - arriving[:, 1] * along[:, 0]
+    straight = (arriving * along).sum(axis=1)
+    for k in np.flatnonzero((turn < 0) & (straight < -1e-9)):
+        place = tuple(corners[k].round(2).tolist())
+        raise ValueError(f"a corner that points into the room must be a right angle or blunter, got {place}")
+
+
 def walls(room):
     """The walls of a room, standing outside of its floor.
 
@@ -204,11 +232,8 @@ def walls(room):
         One for each corner, from it to the next.
     """
     corners = room.corners
-    along = np.roll(corners, -1, axis=0) - corners
-    lengths = np.linalg.norm(along, axis=1)
-    along = along / lengths[:, None]
+    lengths, along, arriving = directions(corners)
     flat = np.abs(along[:, 0])
-    arriving = np.roll(along, 1, axis=0)
     convex = arriving[:, 0] * along[:, 1] > arriving[:, 1] * along[:, 0]
     begins, ends = convex & (flat >= np.roll(flat, 1)), np.roll(convex, -1) & (flat > np.roll(flat, -1))
     parts = []

@@ -4,12 +4,15 @@ A scene is data: it can be written, read and drawn (`dollop.plot.scene`), and wh
 follows from it and a seed. Nothing here needs PyBullet.
 """
 
+import json
 from dataclasses import asdict, dataclass, field, fields, replace
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_array, put_in
+from dollop.checks import check_choice, check_positive, checked_array, checked_positions, put_in
+from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
 from dollop.lab.outlines import Outline, gaps
+from dollop.lab.person import SHOULDERS
 from dollop.lab.rooms import LABORATORY, Part, Room
 from dollop.lab.scanner import MODELS, Scanner, SickLMS200
 from dollop.pose import moved_pose
@@ -33,11 +36,10 @@ __all__ = [
 
 BEAM_HEIGHT = 0.36
 """Height of the laser's plane over the floor in m: a SICK LMS 200 on the deck of a Pioneer 2 DX."""
-HIGHEST_BEAM = 1.4
-"""m: a beam over people's shoulders sees nobody."""
+LOWEST_BEAM, HIGHEST_BEAM = 0.06, 1.4
+"""m: a beam below meets the flat feet of cones, one above sees nobody over people's shoulders."""
 SHAPES = ("box", "cylinder", "cone")
 BODIES = ("torso", "legs")
-SHOULDERS = 0.45
 FORMAT, VERSION = "dollop scene", 1
 
 
@@ -161,7 +163,7 @@ class Object:
         """Radius in m of the circle round its widest part."""
         if self.shape == "box":
             return float(np.hypot(*self.size)) / 2
-        return max(self.size[0], self.foot) / 2
+        return max(self.size[0], self.top, self.foot) / 2
 
     def at(self, position):
         """The object elsewhere.
@@ -218,8 +220,8 @@ class Robot:
         for name in ("speed", "radius"):
             check_positive(f"the robot's {name}", getattr(self, name))
         checked_array("laser_ahead", [self.laser_ahead], 1)
-        if not 0 < self.beam_height < HIGHEST_BEAM:
-            rule = f"the beam height must be over the floor and below people's shoulders, {HIGHEST_BEAM} m"
+        if not LOWEST_BEAM < self.beam_height < HIGHEST_BEAM:
+            rule = f"the beam height must be over feet, {LOWEST_BEAM} m, and below shoulders, {HIGHEST_BEAM} m"
             raise ValueError(f"{rule}, got {self.beam_height} m")
 
     @property
@@ -251,7 +253,7 @@ class Person:
     scatter : float
         Standard deviation in m by which a place is missed, anew in every lap.
     times : tuple of K floats
-        When the person is at each place, in s from `begin`: a walk that is replayed. `speed`,
+        When the person is at each place, in s, the first at `begin`: a walk that is replayed. `speed`,
         `stops`, `laps`, `back` and `scatter` then say nothing.
     seed : int
         What chance there is in the walk comes from it.
@@ -283,6 +285,7 @@ class Person:
             raise ValueError(f"a person walks at 0.1 to 3 m/s, got {self.speed}")
         check_positive("begin", self.begin, or_zero=True)
         check_positive("scatter", self.scatter, or_zero=True)
+        check_choice("back", self.back, (False, True))
         put_in(self, laps=whole("laps", self.laps, 1), seed=whole("seed", self.seed, 0))
         for k, seconds in self.stops:
             check_positive("the time of a stop", seconds)
@@ -333,9 +336,7 @@ def whole(name, value, least):
 
 def as_places(name, values):
     """Places (K, 2) as a tuple of tuples."""
-    return tuple(
-        map(tuple, checked_array(name, np.reshape(values, (-1, 2)) if len(values) == 0 else values, "K", 2).tolist())
-    )
+    return tuple(map(tuple, checked_positions(name, values).tolist())) if len(values) else ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -429,6 +430,39 @@ class Scene:
         """
         places = checked_array("positions", positions, len(self.objects), 2)
         return replace(self, objects=tuple(map(Object.at, self.objects, places)))
+
+    def save(self, path):
+        """Write the scene as JSON, whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+        """
+        with whole_file(path, "w") as stream:
+            json.dump(self.to_dict(), stream)
+
+    @classmethod
+    def load(cls, path):
+        """Read what `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        FormatError
+            If the file is no scene, damaged, or of another version.
+        """
+        try:
+            content = json.loads(read_bytes(path))
+        except (ValueError, RecursionError) as error:
+            raise FormatError(f"not a scene: {error}", path) from error
+        return from_file(path, cls.from_dict, content)
 
     def to_dict(self):
         """The scene as plain lists and numbers, for JSON.

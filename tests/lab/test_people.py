@@ -11,7 +11,7 @@ from random_scenes import random_place, random_scene
 
 from dollop.formats.files import FormatError
 from dollop.lab.outlines import outline_distances
-from dollop.lab.people import find_way, read_walks, walk_of, walks_of
+from dollop.lab.people import find_way, read_walks, replay, walk_of, walks_of
 from dollop.lab.person import SHOULDERS
 from dollop.lab.rooms import Part, Room
 from dollop.lab.scenes import Move, Object, Person, Robot, Scene
@@ -76,6 +76,32 @@ def test_places_are_visited_in_order(laps, back, order):
     assert passed[np.flatnonzero(np.diff(passed, prepend=-1))].tolist() == order
 
 
+def test_a_closed_way_is_walked_in_laps():
+    """A place that ends the way and begins it is passed once a lap, and the place before it is not missed."""
+    once, twice = (walk_of(Person([*PLACES, PLACES[0]], laps=laps, seed=2), HALL) for laps in (1, 2))
+    assert arc_length(twice.positions)[-1] == pytest.approx(2 * arc_length(once.positions)[-1], rel=0.05)
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_a_walk_stays_by_the_straight_lines_between_its_places(back):
+    """Round a corner and back again a person is within half a metre of the lines, however long those are."""
+    places = np.array([(2.0, 2.0), (9.0, 2.0), (9.0, 6.0)])
+    lines = np.vstack([np.linspace(places[0], places[1], 100), np.linspace(places[1], places[2], 100)])
+    walk = walk_of(Person(places, back=back), HALL)
+    assert np.linalg.norm(walk.positions[:, None] - lines, axis=2).min(axis=1).max() < 0.5
+
+
+def test_a_real_walk_can_be_had_anywhere():
+    """Turned and shifted, it begins and ends where it is to, as long and as fast as it was."""
+    t = np.linspace(10.0, 14.0, 40)
+    track = np.column_stack([t, 3.0 + np.sin(t), t])
+    person = replay(track, (2.0, 3.0), 0.5, body="legs")
+    places = np.array(person.places)
+    assert places[0] == pytest.approx((2.0, 3.0)) and person.times[-1] == pytest.approx(4.0)
+    assert np.arctan2(*(places[-1] - places[0])[::-1]) == pytest.approx(0.5)
+    assert arc_length(places)[-1] == pytest.approx(arc_length(track[:, 1:])[-1])
+
+
 @pytest.mark.parametrize("body", ["torso", "legs"])
 def test_a_replayed_walk_is_where_it_was_at_each_time(body):
     """At every time of the record the person is within 2 cm of its place, held before and for 1.5 s after."""
@@ -117,6 +143,15 @@ IN_THE_WAY = {
     "a carton": (replace(HALL, objects=[CARTON], people=[GOING]), "not lead through an object, got object 0 at"),
     "who comes": (replace(HALL, people=[GOING, COMING]), APART),
     "who stands": (replace(HALL, people=[GOING, Person([(6.0, 2.0)])]), APART),
+    "a wall, replayed": (
+        replace(TWO_ROOMS, people=[Person([(1, 1), (5, 1)], times=(0, 4))]),
+        r"0\.0 m .* background, got -0\.\d+ m at",
+    ),
+    "where one stands": (replace(HALL, objects=[CARTON], people=[Person([(6.0, 2.0)])]), "got object 0 at"),
+    "what was moved": (
+        replace(HALL, objects=[CARTON.at((6.0, 4.0))], people=[GOING], moves=[Move(0, 0.0, (6.0, 2.0))]),
+        r"person 0 and object 0, when moved, must keep 0\.12 m apart, got -0\.\d\d m at",
+    ),
     "the robot": (
         replace(HALL, robot=Robot((6.0, 2.0, 0.0)), people=[GOING]),
         r"person 0 and the robot must keep 0\.38 m apart, got 0\.\d\d m at \d\.\d s",
@@ -217,7 +252,7 @@ def test_where_there_is_no_way_it_is_said(scene, places, rule):
 BAD_PEOPLE = [
     ({"places": []}, "needs a place to be, got none"),
     ({"places": [(1.0, np.nan), (2.0, 2.0)]}, "a person's places must be finite, got .*nan"),
-    ({"places": [(1.0, 2.0, 3.0)]}, r"a person's places must have shape \(K, 2\), got \(1, 3\)"),
+    ({"places": [(1.0, 2.0, 3.0)]}, r"a person's places must have shape \(N, 2\), got \(1, 3\)"),
     ({"speed": 0.05}, "0.1 to 3 m/s, got 0.05"),
     ({"speed": np.nan}, "0.1 to 3 m/s, got nan"),
     ({"body": "head"}, "body must be one of 'torso', 'legs', got 'head'"),

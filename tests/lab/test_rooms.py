@@ -96,10 +96,13 @@ CABINET = Part("box", (5.0, 1.0, 0.5), (1.0, 1.0, 1.0))
 BAD_ROOMS = [
     ({"corners": [(0, 0), (4, 4), (4, 0), (0, 4)]}, "must not cross, got walls 0 and 2"),
     ({"corners": [(0, 0), (4, 0), (4, 4), (2, 0), (0, 4)]}, "must not cross, got walls 0 and 2"),
+    ({"corners": [(0, 0), (4, 0), (2, 0)]}, "must not cross|floor of a room must be positive"),
+    ({"corners": [(0, 0), (4, 0), (4, 4), (2, 0.5), (0, 4)]}, r"right angle or blunter, got \(2.0, 0.5\)"),
+    ({"corners": [(0, 0), (1e300, 0), (0, 4)]}, "within 1e\\+09 m of the origin"),
     ({"corners": [(0, 0), (4, 0)]}, "needs three corners or more, got 2"),
     ({"corners": [(0, 0), (4, 0), (4, 0.05), (0, 4)]}, r"at least 0.1 m long, got 0.050 m at corner 1"),
-    ({"corners": [(0, 0), (4, 0), (np.nan, 4)]}, "corners must be finite, got .*nan"),
-    ({"corners": [(0, 0, 0), (4, 0, 0), (4, 4, 0)]}, r"shape \(K, 2\), got \(3, 3\)"),
+    ({"corners": [(0, 0), (4, 0), (np.nan, 4)]}, "corners of a room must be finite, got .*nan"),
+    ({"corners": [(0, 0, 0), (4, 0, 0), (4, 4, 0)]}, r"shape \(N, 2\), got \(3, 3\)"),
     ({"corners": SQUARE, "height": 0.0}, "height of a room must be positive and finite, got 0.0"),
     ({"corners": SQUARE, "furniture": [CABINET]}, r"must stand in the room, got a box at \(5.0, 1.0\)"),
 ]
@@ -116,6 +119,7 @@ BAD_PARTS = [
     ({"shape": "ball"}, "shape must be one of 'box', 'cylinder', got 'ball'"),
     ({"centre": (1.0, np.nan, 0.5)}, "centre must be finite, got nan"),
     ({"size": (1.0, 0.0, 1.0)}, "size must be positive and finite, got 0.0"),
+    ({"shape": "cylinder", "size": (1.0, 2.0, 1.0)}, "as deep as wide"),
     ({"turn": np.nan}, "turn must be finite, got nan"),
     ({"colour": (1.0, 1.0)}, r"colour must have shape \(3,\), got \(2,\)"),
 ]

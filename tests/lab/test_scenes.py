@@ -128,9 +128,9 @@ BAD_ROBOTS = [
     ({"speed": 0.0}, "the robot's speed must be positive and finite, got 0.0"),
     ({"radius": np.nan}, "the robot's radius must be positive and finite, got nan"),
     ({"laser_ahead": np.nan}, "laser_ahead must be finite, got nan"),
-    ({"beam_height": 1.4}, "below people's shoulders, 1.4 m, got 1.4 m"),
-    ({"beam_height": 0.0}, "over the floor .*, got 0.0 m"),
-    ({"beam_height": np.nan}, "over the floor .*, got nan m"),
+    ({"beam_height": 1.4}, "below shoulders, 1.4 m, got 1.4 m"),
+    ({"beam_height": 0.0}, "over feet, .*, got 0.0 m"),
+    ({"beam_height": np.nan}, "over feet, .*, got nan m"),
 ]
 
 
