@@ -1,6 +1,6 @@
 # make figures   set up .venv from the lock, then regenerate every figure
 # make test      the same set-up, then unit tests, doctests and the notebooks
-.PHONY: help figures test fast coverage check study bench book data clean
+.PHONY: help figures test fast coverage check study worlds bench book data clean
 .DEFAULT_GOAL := help
 
 # The lock is for Python 3.11: the first of these that really is one.
@@ -35,6 +35,9 @@ check: .venv/ready  ## lint and formatting
 
 study: .venv/ready  ## test the paper's claims over a hundred seeds; goes on where it was
 	$(RUN) -m dollop study
+
+worlds: .venv/ready  ## the whole chain in 300 random worlds; goes on where it was
+	$(RUN) -m dollop study worlds
 
 bench: .venv/ready  ## benchmarks beside plain baselines, one thread
 	$(RUN) -m benchmarks

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from dollop.lab import person
+from dollop.lab.driving import ARRIVED, pursue
 from dollop.lab.people import walks_of
 from dollop.lab.pioneer import Pioneer
 from dollop.lab.recording import MOVED_COLUMNS, ROBOT_COLUMNS, TRUTH_COLUMNS, Recording
@@ -15,7 +16,7 @@ from dollop.laser import LaserLog
 from dollop.pose import moved_pose, wrapped
 from dollop.robot.control import PIONEER_LIMITS
 
-__all__ = ["pursue", "record", "record_background", "record_figure_eights", "record_tour", "watch"]
+__all__ = ["record", "record_background", "record_figure_eights", "record_tour", "watch"]
 
 TOUR = np.transpose(
     [
@@ -26,8 +27,6 @@ TOUR = np.transpose(
 """Way-points (K, 2) in m of the drive that shows the laser every side of the paper's laboratory."""
 TOUR_LIMITS = PIONEER_LIMITS._replace(turn=1.75)
 """On that drive the robot may turn as fast as it can: 100 deg/s (Player, p2os)."""
-ARRIVED = 0.3
-"""Distance in m from a way-point at which the next one is driven to."""
 
 
 def record(scene, seed, walks=None, duration=None):
@@ -238,27 +237,3 @@ def record_tour(scene, places, seed, stride=0.15, turns=12):
         ranges = [world.scan(pose, rng) for pose in poses]
     t = np.arange(len(poses)) / scanner.rate
     return LaserLog(t, np.array(ranges), scanner.angles, np.array(poses), scanner.max_range)
-
-
-def pursue(pose, goal, speed=0.5, gain=1.5):
-    """Speed and turning rate towards a goal, slower where it is aside.
-
-    Parameters
-    ----------
-    pose : (3,) sequence of float
-        x, y in m, theta in rad.
-    goal : (2,) sequence of float
-        In m.
-    speed : float
-        In m/s.
-    gain : float
-        Turning rate in rad/s per rad of error.
-
-    Returns
-    -------
-    speed, turn : float
-        In m/s and rad/s.
-    """
-    x, y, theta = pose
-    error = wrapped(np.arctan2(goal[1] - y, goal[0] - x) - theta)
-    return speed * max(np.cos(error), 0.0) ** 2, gain * error

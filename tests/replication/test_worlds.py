@@ -16,7 +16,9 @@ from dollop.lab.people import walk_of, walks_of
 from dollop.lab.scenes import Object, Person, Scene
 from dollop.replication.worlds import chain, survey
 from dollop.replication.worlds.chain import Judgement, judge, judge_objects, judge_user, side
-from dollop.replication.worlds.draw import FAIR, KINDS, draw, draw_room, in_view, objects_in_view
+from dollop.replication.worlds.draw import FAIR, KINDS, draw
+from dollop.replication.worlds.rooms import draw_room
+from dollop.replication.worlds.view import in_view, objects_in_view
 
 SEEDS = range(90_002, 90_002 + len(KINDS))
 
@@ -77,9 +79,11 @@ def test_rooms_are_of_every_shape():
 
 def test_the_generator_knows_nothing_of_the_observer():
     """It draws from the laboratory and geometry alone: no threshold of what is measured can be in it."""
-    tree = ast.parse((ROOT / "dollop/replication/worlds/draw.py").read_text(encoding="utf-8"))
-    rooms = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)} - {"dataclasses"}
-    assert all(room.startswith("dollop.lab.") or room in ("dollop.pose", "dollop.trajectory") for room in rooms)
+    for name in ("draw", "rooms", "view"):
+        tree = ast.parse((ROOT / f"dollop/replication/worlds/{name}.py").read_text(encoding="utf-8"))
+        taken = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)} - {"dataclasses"}
+        known = ("dollop.lab.", "dollop.pose", "dollop.trajectory", "dollop.replication.worlds.")
+        assert all(each.startswith(known) and "chain" not in each for each in taken)
 
 
 def test_what_is_hidden_is_not_in_view():

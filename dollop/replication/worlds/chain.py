@@ -17,7 +17,8 @@ from dollop.gridmap import OccupancyGrid
 from dollop.lab.people import walk_of
 from dollop.matching import match
 from dollop.observation import observe
-from dollop.replication.worlds.draw import moved_objects, objects_in_view
+from dollop.replication.worlds.draw import moved_objects
+from dollop.replication.worlds.view import objects_in_view
 from dollop.robot.performing import perform
 from dollop.task import Demonstration, learn
 from dollop.trajectory import arc_length, resample
