@@ -1,10 +1,10 @@
-"""Notebook 01 simulates the lab; where PyBullet is missing it is skipped, and the reason says how to get it."""
+"""Notebooks 01 and 10 simulate; where PyBullet is missing they are skipped, and the reason says how to get it."""
 
 from importlib.util import find_spec
 
 import pytest
 
-NEEDS_PYBULLET = ("01_lab_and_laser.ipynb",)
+NEEDS_PYBULLET = ("01_lab_and_laser.ipynb", "10_other_rooms.ipynb")
 
 
 def pytest_collection_modifyitems(items):

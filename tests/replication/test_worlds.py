@@ -4,6 +4,7 @@ import ast
 from dataclasses import replace
 from types import SimpleNamespace
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -17,6 +18,7 @@ from dollop.lab.scenes import Object, Person, Scene
 from dollop.replication.worlds import chain, survey
 from dollop.replication.worlds.chain import Judgement, judge, judge_objects, judge_user, side
 from dollop.replication.worlds.draw import FAIR, KINDS, draw
+from dollop.replication.worlds.picture import draw_judged
 from dollop.replication.worlds.rooms import draw_room
 from dollop.replication.worlds.view import in_view, objects_in_view
 
@@ -274,6 +276,29 @@ def test_the_chain_ends_alike_twice(tmp_path):
     assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
 
 
+def test_every_world_can_be_drawn(worlds):
+    """A picture of each demonstration, and of what stood where later, whatever became of the world."""
+    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
+    judgement = judge(worlds[0])
+    figure, axes = plt.subplots(1, 3)
+    for world in worlds:
+        for ax, k in zip(axes, (0, len(world.demonstrations) - 1, -1), strict=True):
+            draw_judged(ax, world, judgement if world is worlds[0] else Judgement(), k)
+            assert ax.get_title().startswith(str(world.seed)) and ax.patches
+            ax.clear()
+    plt.close(figure)
+
+
+def test_a_dask_cluster_finds_the_same(tmp_path):
+    """A study of worlds on a cluster, named by its scheduler, leaves the same table as one on this machine."""
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
+    here = survey.run_survey(SEEDS[7:9], tmp_path / "here.csv", jobs=1)
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        there = survey.run_survey(SEEDS[7:9], tmp_path / "there.csv", cluster.scheduler_address)
+    assert here.equals(there)
+
+
 def test_an_easy_world_ends_right():
     """Two cans, one person who walks past them, nothing else: map, observe, learn, adapt and perform all succeed."""
     pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
@@ -289,3 +314,22 @@ def test_an_easy_world_ends_right():
     row = judge(world).row(world)
     assert row["outcome"] == "right", row
     assert row["user_right"] > 0.98 and row["found"] == 2 and row["finished"] == 1
+
+
+def test_the_command_writes_table_summary_and_pictures(tmp_path, fake, monkeypatch, capsys):
+    """All four files are there and named; the report is told of seeds 0 to 299 and of no others."""
+    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
+    monkeypatch.setattr(survey, "draw_sheet", lambda seeds, path: path.touch())
+    monkeypatch.setattr(survey, "SEEDS", 12)
+    report, folder = tmp_path / "REPLICATION.md", tmp_path / "study"
+    report.write_text("<!-- worlds: begin -->\n<!-- worlds: end -->\n")
+    main(["study", "worlds", "--seeds", "3", "--folder", str(folder)])
+    assert report.read_text().count("|") == 0
+    main(["study", "worlds", "--folder", str(folder)])
+    assert "| **all** | 12 | 4 | 4 | 0 | 4 | 0 |\n" in report.read_text()
+    told = capsys.readouterr().out
+    for name in ("REPLICATION.md", "study/worlds.csv", "study/worlds.json", "study/worlds_worst.png"):
+        assert (tmp_path / name).exists() and str(tmp_path / name) in told
+    (folder / survey.FIRST).write_bytes((folder / "worlds.csv").read_bytes())
+    main(["study", "worlds", "--folder", str(folder)])
+    assert "| **all** | 12 | 4 | 4 | 0 | 4 | 0 | 4 |\n" in report.read_text()

@@ -1,7 +1,9 @@
 """A world and what became of it as one picture: the truth in pale blue, what Dollop made of it over it."""
 
+import textwrap
+
 from dollop import plot
-from dollop.lab.people import walks_of
+from dollop.lab.people import walk_of
 
 __all__ = ["draw_judged"]
 
@@ -19,16 +21,17 @@ def draw_judged(ax, world, judgement, k=0):
     """
     results, row = judgement.results, judgement.row(world)
     scene = world.later if k < 0 else world.demonstrations[k]
-    plot.scene(ax, scene, walks_of(scene))
+    plot.scene(ax, scene, [walk_of(person, scene) for person in scene.people])
     if "map" in results:
         plot.grid_map(ax, results["map"])
     if k < 0:
         _draw_later(ax, results)
     elif len(results.get("observations", ())) > k:
         _draw_observed(ax, results, k)
-    title = f"{world.seed}: {row['kind']}, {row['room']}\n{row['outcome']}"
     told = row["causes"] or f"{row['stage']} {row['told']}".strip()
-    plot.plane(ax, f"{title}{': ' if told else ''}{told[:60]}").title.set_fontsize(7)
+    ending = textwrap.shorten(f"{row['outcome']}: {told}" if told else row["outcome"], 130, placeholder=" ...")
+    title = "\n".join([f"{world.seed}: {row['kind']}, {row['room']}", *textwrap.wrap(ending, 55)])
+    plot.plane(ax, title).title.set_fontsize(7)
     ax.tick_params(labelsize=6)
     left, low, right, high = scene.room.bounds
     ax.set(xlabel="", ylabel="", xlim=(left - 0.5, right + 0.5), ylim=(low - 0.5, high + 0.5))

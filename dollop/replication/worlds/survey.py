@@ -248,7 +248,7 @@ def command(options):
 
 
 def publish(table, folder):
-    """Write the summary and the sheet of the worst, and the tables in REPLICATION.md if it tells of this study."""
+    """Write the summary and the sheet of the worst, and the tables in REPLICATION.md if it tells of these worlds."""
     found = summary(table)
     first = folder / FIRST
     before = summary(read_table(first)) if first.exists() else None
@@ -260,7 +260,7 @@ def publish(table, folder):
     draw_sheet(worst_seeds(table), sheet)
     written_too = [folder / "worlds.csv", folder / "worlds.json", sheet]
     report = report_beside(folder)
-    if report:
+    if report and table.index.tolist() == list(range(SEEDS)):
         text = put_between_marks(report.read_text(), "worlds", tables(found, before))
         with whole_file(report, "w") as stream:
             stream.write(text)
