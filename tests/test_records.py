@@ -39,5 +39,5 @@ def test_what_is_told_is_what_is_there(records):
     told = {type(record).__name__: repr(record) for record in records}
     assert "929 scans" in told["LaserLog"] and "181 beams" in told["LaserLog"]
     assert "6 segments" in told["SequencedLDS"] and "shown 2 x" in told["Task"]
-    assert "trash can (2.50, 3.60)" in told["Scene"] and "finished" in told["Run"]
+    assert "cylinder (2.50, 3.60)" in told["Scene"] and "finished" in told["Run"]
     assert repr(dollop.Environment([])) == "Environment of 0 objects"

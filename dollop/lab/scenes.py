@@ -383,7 +383,8 @@ class Scene:
         check_moves(self)
 
     def __repr__(self):
-        objects = ", ".join(f"{each.shape} {rounded(each.position)}" for each in self.objects)
+        placed = [(each.shape, *each.position) for each in self.objects]
+        objects = ", ".join(f"{shape} ({x:.2f}, {y:.2f})" for shape, x, y in placed)
         people = f", {len(self.people)} people" if self.people else ""
         return f"Scene of {objects or 'nothing'}{people}"
 

@@ -342,6 +342,6 @@ def test_real_walks_are_read_and_replayed():
     lengths = np.array([arc_length(walk[:, 1:])[-1] for walk in walks])
     assert len(walks) == 110 and np.median(lengths) == pytest.approx(13.0, abs=0.5)
     assert np.median(lengths / [walk[-1, 0] for walk in walks]) == pytest.approx(1.4, abs=0.05)
-    t, places = walks[7][:, 0], walks[7][:, 1:] - walks[7][:, 1:].mean(axis=0) + (12.0, 4.0)
-    replayed = walk_of(Person(places, times=t, begin=0.0), HALL)
-    assert np.abs([replayed.at(time)[0] for time in t] - places).max() < 0.02
+    person = replay(walks[7], (2.0, 4.0), 0.0, begin=0.0)
+    replayed = walk_of(person, HALL)
+    assert np.abs([replayed.at(time)[0] for time in person.times] - np.array(person.places)).max() < 0.02

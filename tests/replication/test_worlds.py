@@ -293,9 +293,9 @@ def test_a_dask_cluster_finds_the_same(tmp_path):
     """A study of worlds on a cluster, named by its scheduler, leaves the same table as one on this machine."""
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
     pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
-    here = survey.run_survey(SEEDS[7:9], tmp_path / "here.csv", jobs=1)
+    here = survey.run_survey(SEEDS[7:8], tmp_path / "here.csv", jobs=1)
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        there = survey.run_survey(SEEDS[7:9], tmp_path / "there.csv", cluster.scheduler_address)
+        there = survey.run_survey(SEEDS[7:8], tmp_path / "there.csv", cluster.scheduler_address)
     assert here.equals(there)
 
 
