@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from dollop.extras import need
 
-__all__ = ["as_json", "put_between_marks", "report_beside", "run_all"]
+__all__ = ["as_json", "going_on_in", "put_between_marks", "report_beside", "run_all"]
 
 ATTEMPTS = 3
 """How often in a row workers may die without a seed being finished before the study gives up."""
@@ -81,6 +81,18 @@ def workers(scheduler=None, jobs=-1):
 
     with Client(scheduler), joblib.parallel_config("dask"):
         yield parallel(timeout=PATIENCE)
+
+
+@contextmanager
+def going_on_in(path):
+    """Say of what ends a study early that the same command goes on with the table at a path."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise ValueError(f"{error}. Run the same command again to go on") from error
+    except KeyboardInterrupt:
+        done = f"what was done is in {path}, the same command goes on there"
+        raise KeyboardInterrupt(done if path.exists() else "nothing was done yet") from None
 
 
 # ---- telling

@@ -18,7 +18,7 @@ from dollop.extras import need
 from dollop.formats.files import FormatError, check_writable, whole_file
 from dollop.replication.claims import CLAIMS
 from dollop.replication.claims.observing import choose_noises
-from dollop.replication.running import as_json, put_between_marks, report_beside, run_all
+from dollop.replication.running import as_json, going_on_in, put_between_marks, report_beside, run_all
 from dollop.replication.worlds.survey import command as survey_worlds
 
 __all__ = ["command"]
@@ -340,13 +340,8 @@ def command(options):
     check_writable(path)
     if report_beside(folder) and not path.exists():
         choose_noises()
-    try:
+    with going_on_in(path):
         table = run_study(options.ids or list(CLAIMS), range(seeds), path, options.scheduler)
-    except RuntimeError as error:
-        raise ValueError(f"{error}. Run the same command again to go on") from error
-    except KeyboardInterrupt:
-        done = f"what was done is in {path}, the same command goes on there"
-        raise KeyboardInterrupt(done if path.exists() else "nothing was done yet") from None
     publish(table, folder)
 
 

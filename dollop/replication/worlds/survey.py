@@ -14,7 +14,7 @@ import pandas as pd
 
 from dollop.extras import need
 from dollop.formats.files import FormatError, check_writable, whole_file
-from dollop.replication.running import as_json, put_between_marks, report_beside, run_all
+from dollop.replication.running import as_json, going_on_in, put_between_marks, report_beside, run_all
 from dollop.replication.worlds.chain import CAUSES, COLUMNS, OUTCOMES, judge
 from dollop.replication.worlds.draw import KINDS, draw
 
@@ -236,14 +236,8 @@ def command(options):
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "worlds.csv"
     check_writable(path)
-    try:
-        seeds = range(options.first_seed, options.first_seed + count)
-        table = run_survey(seeds, path, options.scheduler)
-    except RuntimeError as error:
-        raise ValueError(f"{error}. Run the same command again to go on") from error
-    except KeyboardInterrupt:
-        done = f"what was done is in {path}, the same command goes on there"
-        raise KeyboardInterrupt(done if path.exists() else "nothing was done yet") from None
+    with going_on_in(path):
+        table = run_survey(range(options.first_seed, options.first_seed + count), path, options.scheduler)
     publish(table, folder)
 
 
