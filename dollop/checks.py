@@ -2,7 +2,7 @@
 
 import numpy as np
 
-__all__ = ["check_choice", "check_positive", "checked_array", "checked_positions", "put_in"]
+__all__ = ["check_choice", "check_positive", "checked_array", "checked_number", "checked_positions", "put_in"]
 
 FARTHEST = 1e9
 """m from the origin: coordinates beyond are no metres, and their squares would overflow."""
@@ -92,7 +92,10 @@ def checked_array(name, values, *shape, finite=True):
     Traceback (most recent call last):
     ValueError: boxes must have shape (N, 4), got (1, 3)
     """
-    array = np.array(values, dtype=float)
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be numbers in rows of one length, got {values!r:.60}") from None
     sizes = zip(shape, array.shape, strict=False)
     if array.ndim != len(shape) or any(n != m for n, m in sizes if not isinstance(n, str)):
         wanted = f"({shape[0]},)" if len(shape) == 1 else f"({', '.join(map(str, shape))})"
@@ -101,6 +104,41 @@ def checked_array(name, values, *shape, finite=True):
         row = np.argwhere(~np.isfinite(array))[0, 0]
         raise ValueError(f"{name} must be finite, got {array[row].tolist()} in row {row}")
     return array
+
+
+def checked_number(name, value, least=-np.inf, most=np.inf):
+    """A value as a float, if it is a finite number within bounds, and neither text nor True nor False.
+
+    Parameters
+    ----------
+    name : str
+        What to call it in the error.
+    value : object
+    least, most : float
+        Bounds, both of them allowed.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        With name, rule and value.
+
+    Examples
+    --------
+    >>> checked_number("turn", "0.4")
+    Traceback (most recent call last):
+    ValueError: turn must be a finite number, got '0.4'
+    """
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+        raise ValueError(f"{name} must be a finite number, got {value!r:.60}")
+    if not -FARTHEST <= value <= FARTHEST:
+        raise ValueError(f"{name} must be a finite number within {FARTHEST:g}, got {str(value):.60}")
+    if not least <= value <= most:
+        raise ValueError(f"{name} must be in {least:g} to {most:g}, got {value}")
+    return float(value)
 
 
 def checked_positions(name, values):

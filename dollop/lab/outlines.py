@@ -53,6 +53,22 @@ class Outline(namedtuple("Outline", "x y half_width half_depth turn radius", def
         middle = np.array([self.x, self.y])
         return np.concatenate([middle - half, middle + half])
 
+    def shrunk(self, by):
+        """The outline, smaller all round.
+
+        Parameters
+        ----------
+        by : float
+            In m.
+
+        Returns
+        -------
+        Outline
+        """
+        sizes = [max(size - by, 0.0) for size in self[2:4]] if self.half_width or self.half_depth else self[2:4]
+        radius = self.radius if self.half_width or self.half_depth else max(self.radius - by, 0.0)
+        return Outline(*self[:2], *sizes, self.turn, radius)
+
     @property
     def border(self):
         """(N, 2) points all round it in m, to draw it."""

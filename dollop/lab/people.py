@@ -10,7 +10,9 @@ import pandas as pd
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
+from dollop.checks import checked_array
 from dollop.formats.files import FormatError
+from dollop.lab.driving import planned_poses
 from dollop.lab.outlines import outline_distances
 from dollop.lab.person import DEPTH, SHOULDERS, TIME_STEP, Walk, check_room, walk, walk_along
 from dollop.lab.scenes import Person
@@ -132,10 +134,15 @@ def walks_of(scene):
         if not scene.robot.way:
             away = np.linalg.norm(way - scene.robot.pose[:2], axis=1)
             check_apart(away, DEPTH / 2 + scene.robot.radius, t, f"person {i} and the robot")
-        for move in scene.moves:
-            there = scene.objects[move.object].at(move.to).footprint
-            away = np.where(t < move.begin, np.inf, outline_distances(way, [there])[:, 0])
-            check_apart(away, DEPTH / 2, t, f"person {i} and object {move.object}, when moved,")
+        else:
+            away = np.linalg.norm(way - planned_poses(scene.robot, t)[:, :2], axis=1)
+            check_apart(away, DEPTH / 2 + scene.robot.radius, t, f"person {i} and the robot that drives")
+        for k in {move.object for move in scene.moves}:
+            moving = t >= min(move.begin for move in scene.moves if move.object == k)
+            there = [scene.objects[k].at(scene.object_at(k, time)).footprint for time in t[moving]]
+            away = np.full(len(t), np.inf)
+            away[moving] = [outline_distances([at], [each])[0, 0] for at, each in zip(way[moving], there, strict=True)]
+            check_apart(away, DEPTH / 2, t, f"person {i} and object {k}, when moved,")
     return walks
 
 
@@ -289,7 +296,7 @@ def replay(track, start, heading, **more):
     >>> np.round(person.places, 6).tolist(), person.times
     ([[1.0, 2.0], [2.0, 2.0]], (0.0, 1.0))
     """
-    t, *way = np.asarray(track, dtype=float).T
+    t, *way = checked_array("track", track, "N", 3).T
     away = np.transpose(way) - np.array(way)[:, 0]
     turn = heading - np.arctan2(*away[-1, ::-1])
     places = start + away @ rotation(turn).T
@@ -322,8 +329,9 @@ def read_walks(folder):
     for path in paths:
         try:
             table = pd.read_csv(path)
-            people = table[table[WALK_COLUMNS].label == "ped"].groupby("id")
-        except (ValueError, KeyError, OSError, EOFError) as error:
+            table = table[table[WALK_COLUMNS].label == "ped"].astype(dict.fromkeys(["frame", "x_est", "y_est"], float))
+            people = table.groupby("id")
+        except (ValueError, KeyError, OSError, EOFError, TypeError) as error:
             raise FormatError(f"not a table of walks with {', '.join(WALK_COLUMNS)}: {error}", path) from error
         for _, rows in people:
             t = (rows.frame - rows.frame.iloc[0]) / FRAMES_PER_SECOND

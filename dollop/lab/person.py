@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
-from dollop.checks import checked_positions
+from dollop.checks import check_choice, checked_number, checked_positions
 from dollop.lab.outlines import nearest_core, outline_distances
 from dollop.trajectory import arc_length, resample
 
@@ -268,6 +268,9 @@ def walk(
     >>> bool(gap - SHOULDERS / 2 >= CLEARANCE)
     True
     """
+    checked_number("speed", speed, 0.1, 3)
+    checked_number("from_background", from_background, 0)
+    check_choice("body", body, ("torso", "legs"))
     rng = np.random.default_rng(seed)
     points = checked_positions("the via-points of a walk", points)
     if len(points) < 2 or not np.diff(points, axis=0).any(axis=1).all():
@@ -276,6 +279,9 @@ def walk(
     path = path + left_of(tangents(path)) * wander(len(path), 1.5 / PATH_STEP, drift, rng)[:, None]
     path = evenly(keep_clear(path, scene))
     before, after = np.broadcast_to(stand, 2)
+    for k, seconds in [(0, before), (0, after), *stops]:
+        if not (0 <= seconds < np.inf and k in range(len(points))):
+            raise ValueError(f"people stand at one of {len(points)} places for 0 s or more, got {k} and {seconds}")
     pauses = [(0.0, before), *((passed(path, points, k), seconds) for k, seconds in stops)]
     distance = travelled(speed_profile(path, speed, rng, pauses), pauses, after)
     positions, headings = along_path(path, distance)

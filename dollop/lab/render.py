@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.image import imsave
 
+from dollop.checks import checked_number
 from dollop.lab.engine import Engine
 from dollop.lab.person import body_offsets
 from dollop.lab.pioneer import put_pioneer
@@ -63,6 +64,8 @@ def render_lab(scene=None, walkers=(), width=1200, height=900):
     (height, width, 3) uint8 array
     """
     scene = scene or figure_eight_scene()
+    for name, pixels in (("width", width), ("height", height)):
+        checked_number(name, pixels, 1, 10_000)
     with Engine() as studio:
         furnish(studio, scene.room)
         for each in scene.objects:

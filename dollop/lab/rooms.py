@@ -10,12 +10,14 @@ from functools import cached_property
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_array, checked_positions, put_in
+from dollop.checks import check_choice, check_positive, checked_array, checked_number, checked_positions, put_in
 from dollop.lab.outlines import Outline, crosses_itself, gaps, inside, outline_distances, wall_distances
 
 __all__ = ["GREY", "LABORATORY", "OAK", "Part", "Room", "STEEL", "WALL_THICKNESS", "WHITE", "panel", "walls"]
 
 WALL_THICKNESS = 0.10
+MOST_CORNERS, LARGEST = 100, 200.0
+"""Corners, and m: rooms are no larger."""
 OAK, STEEL, WHITE = (0.72, 0.53, 0.33), (0.55, 0.58, 0.62), (0.90, 0.89, 0.85)
 DARK, GREY, BLUE = (0.13, 0.14, 0.16), (0.42, 0.44, 0.47), (0.30, 0.48, 0.66)
 
@@ -56,7 +58,7 @@ class Part:
         check_positive("size", min(self.size))
         if self.shape == "cylinder" and self.size[0] != self.size[1]:
             raise ValueError(f"a cylinder must be as deep as wide, got {self.size[:2]}")
-        checked_array("turn", [self.turn], 1)
+        put_in(self, turn=checked_number("turn", self.turn))
 
     @property
     def outline(self):
@@ -97,7 +99,8 @@ class Room:
     Raises
     ------
     ValueError
-        If there are fewer than three corners, the walls cross, or furniture stands outside.
+        If there are fewer than three corners or too many, walls cross or stand in the floor, or the middle of
+        a piece of furniture is outside, or its foot below the floor.
 
     Examples
     --------
@@ -115,7 +118,10 @@ class Room:
         corners = checked_positions("the corners of a room", self.corners)
         if len(corners) < 3:
             raise ValueError(f"a room needs three corners or more, got {len(corners)}")
-        check_positive("the height of a room", self.height)
+        if len(corners) > MOST_CORNERS or np.ptp(corners, axis=0).max() > LARGEST:
+            rule = f"a room must have at most {MOST_CORNERS} corners and be {LARGEST:g} m long at most"
+            raise ValueError(f"{rule}, got {len(corners)} and {np.ptp(corners, axis=0).max():g} m")
+        checked_number("the height of a room", self.height, 0.1, 20)
         lengths = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
         if lengths.min() < WALL_THICKNESS:
             rule = f"a wall must be at least {WALL_THICKNESS} m long"
@@ -127,10 +133,10 @@ class Room:
         if area < 0:
             corners = corners[::-1].copy()
         check_positive("the floor of a room", abs(area) / 2)
-        check_corners(corners)
+        check_walls(corners)
         put_in(self, corners=corners, furniture=tuple(self.furniture), height=float(self.height))
         for part in self.furniture:
-            if not inside(np.array([part.centre[:2]]), corners)[0]:
+            if not inside(np.array([part.centre[:2]]), corners)[0] or part.centre[2] < part.size[2] / 2 - 0.01:
                 place = tuple(round(value, 2) for value in part.centre[:2])
                 raise ValueError(f"furniture must stand in the room, got a {part.shape} at {place}")
 
@@ -207,20 +213,18 @@ def directions(corners):
     return lengths, along, np.roll(along, 1, axis=0)
 
 
-def check_corners(corners):
-    """No wall reaches into the floor: outside of a re-entrant corner there is a right angle or more."""
-    _, along, arriving = directions(corners)
-    turn = arriving[:, 0] * along[:, 1] - arriving[:, 1] * along[:, 0]
-    straight = (arriving * along).sum(axis=1)
-    for k in np.flatnonzero((turn < 0) & (straight < -1e-9)):
-        place = tuple(corners[k].round(2).tolist())
-        raise ValueError(f"a corner that points into the room must be a right angle or blunter, got {place}")
+def check_walls(corners):
+    """No wall stands in the floor, as it would beside a sharp corner or where two arms are nearly in touch."""
+    for k, outline in enumerate(wall.outline for wall in walls_round(corners, 1.0)):
+        if inside(outline.shrunk(0.01).border, corners).any():
+            place = tuple(corners[k].round(2).tolist())
+            raise ValueError(
+                f"a wall is {WALL_THICKNESS} m thick and must not stand in the floor, got one from {place}"
+            )
 
 
 def walls(room):
     """The walls of a room, standing outside of its floor.
-
-    At a corner that is not re-entrant the wall that runs more along x reaches round it.
 
     Parameters
     ----------
@@ -231,7 +235,11 @@ def walls(room):
     list of Part
         One for each corner, from it to the next.
     """
-    corners = room.corners
+    return walls_round(room.corners, room.height)
+
+
+def walls_round(corners, height):
+    """Walls of some height (m) outside of a floor; round a corner reaches the one that runs more along x."""
     lengths, along, arriving = directions(corners)
     flat = np.abs(along[:, 0])
     convex = arriving[:, 0] * along[:, 1] > arriving[:, 1] * along[:, 0]
@@ -241,7 +249,7 @@ def walls(room):
         first, last = -WALL_THICKNESS * begins[k], lengths[k] + WALL_THICKNESS * ends[k]
         outwards = np.array([along[k, 1], -along[k, 0]])
         x, y = corner + along[k] * (first + last) / 2 + outwards * WALL_THICKNESS / 2
-        parts.append(panel((x, y), last - first, along[k], WALL_THICKNESS, room.height, WHITE))
+        parts.append(panel((x, y), last - first, along[k], WALL_THICKNESS, height, WHITE))
     return parts
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive
+from dollop.checks import check_choice, checked_number
 
 __all__ = ["MODELS", "SCAN_RATES", "Scanner", "SickLMS200", "SickTiM571", "UTM30LX", "mix_pixels"]
 
@@ -12,8 +12,21 @@ SCAN_RATES = {(180, 1): 10.0, (180, 0.5): 5.0, (100, 1): 17.0, (100, 0.5): 9.0, 
 """Scans per second of a SICK LMS 200 at 38400 baud for each field of view and resolution in degrees
 on offer (drivers of CARMEN and Player)."""
 
+DATA_SHEETS = {
+    "SICK TiM571": dict(fov=270, resolution=1 / 3, rate=15.0, max_range=25.0, min_range=0.05, step=0.001),
+    "Hokuyo UTM-30LX": dict(fov=270, resolution=0.25, rate=40.0, max_range=30.0, min_range=0.1, step=0.001),
+}
+"""What the data sheets of scanners with a single mode say."""
+
 MODES = {"mm": (0.001, 8.191), "cm": (0.01, 81.91)}
 """Step and farthest range in m of its measuring modes: 13 bits count 8191 steps."""
+
+
+RANGES = {
+    "fov": (0.1, 360), "resolution": (0.01, 90), "rate": (0.1, 1000), "max_range": (0.1, 1000), "min_range": (0, 1000),
+    "step": (1e-4, 1), "noise": (0, 1), "bias": (-1, 1), "mixed": (0, 1), "jump": (1e-3, 1000), "missed": (0, 1),
+}  # fmt: skip
+"""What the numbers of a scanner can be."""
 
 
 @dataclass(frozen=True)
@@ -68,19 +81,19 @@ class Scanner:
     missed: float = 0.0
 
     def __post_init__(self):
-        for name in ("fov", "resolution", "rate", "max_range", "step", "jump"):
-            check_positive(name, getattr(self, name))
-        for name in ("min_range", "noise", "mixed", "missed"):
-            check_positive(name, getattr(self, name), or_zero=True)
+        if not isinstance(self.model, str):
+            raise ValueError(f"model must be a name, got {self.model!r:.60}")
+        for name, (least, most) in RANGES.items():
+            checked_number(name, getattr(self, name), least, most)
+        if abs(1 / self.step - round(1 / self.step)) > 1e-6:
+            raise ValueError(f"step must be a whole part of a metre, got {self.step:g}")
         if self.fov > 360 or abs(self.fov / self.resolution - round(self.fov / self.resolution)) > 1e-6:
             rule = "fov must be at most 360 degrees and a multiple of resolution"
             raise ValueError(f"{rule}, got {self.fov:g} and {self.resolution:g}")
-        if not (self.min_range < self.max_range and np.isfinite(self.bias)):
-            rule = "min_range must be below max_range and the bias finite"
-            raise ValueError(f"{rule}, got {self.min_range:g}, {self.max_range:g} and {self.bias:g}")
-        for name in ("mixed", "missed"):
-            if getattr(self, name) > 1:
-                raise ValueError(f"{name} must be a probability, got {getattr(self, name):g}")
+        if not self.min_range < self.max_range:
+            raise ValueError(f"min_range must be below max_range, got {self.min_range:g} and {self.max_range:g}")
+        if self.model in MODELS:
+            check_mode(self)
 
     @property
     def angles(self):
@@ -152,7 +165,7 @@ def SickLMS200(fov=180, resolution=1.0, mode="mm", noise=0.005, **errors):
     """
     if (fov, resolution) not in SCAN_RATES:
         valid = ", ".join(f"{width}/{step:g}" for width, step in SCAN_RATES)
-        raise ValueError(f"fov/resolution must be one of {valid} degrees, got {fov}/{resolution:g}")
+        raise ValueError(f"fov/resolution must be one of {valid} degrees, got {fov}/{resolution}")
     check_choice("mode", mode, MODES)
     step, farthest = MODES[mode]
     rate = SCAN_RATES[fov, resolution]
@@ -180,7 +193,7 @@ def SickTiM571(noise=0.020, **errors):
     >>> len(SickTiM571().angles)
     811
     """
-    return Scanner("SICK TiM571", 270, 1 / 3, 15.0, 25.0, 0.05, 0.001, noise, **errors)
+    return Scanner("SICK TiM571", **DATA_SHEETS["SICK TiM571"], noise=noise, **errors)
 
 
 def UTM30LX(noise=0.010, **errors):
@@ -204,11 +217,27 @@ def UTM30LX(noise=0.010, **errors):
     >>> len(UTM30LX().angles)
     1081
     """
-    return Scanner("Hokuyo UTM-30LX", 270, 0.25, 40.0, 30.0, 0.1, 0.001, noise, **errors)
+    return Scanner("Hokuyo UTM-30LX", **DATA_SHEETS["Hokuyo UTM-30LX"], noise=noise, **errors)
 
 
 MODELS = {"SICK LMS 200": SickLMS200, "SICK TiM571": SickTiM571, "Hokuyo UTM-30LX": UTM30LX}
 """The scanners on offer, by name."""
+
+
+def check_mode(scanner):
+    """Refuse a scanner of a model on offer in a mode that the model does not have."""
+    if scanner.model == "SICK LMS 200":
+        key, steps = (scanner.fov, scanner.resolution), {step: mode for mode, (step, _) in MODES.items()}
+        if key not in SCAN_RATES or scanner.step not in steps:
+            SickLMS200(*key, steps.get(scanner.step, f"{scanner.step:g} m"))  # it says what there is
+        farthest = MODES[steps[scanner.step]][1]
+        wanted = {"rate": SCAN_RATES[key], "max_range": farthest, "min_range": 0.2}
+    else:
+        wanted = DATA_SHEETS[scanner.model]
+    for name, value in wanted.items():
+        if abs(getattr(scanner, name) - value) > 1e-9:
+            rule = f"{name} of a {scanner.model} must be {value:g} in this mode"
+            raise ValueError(f"{rule}, got {getattr(scanner, name):g}")
 
 
 def mix_pixels(distances, probability, jump, rng):

@@ -5,16 +5,17 @@ follows from it and a seed. Nothing here needs PyBullet.
 """
 
 import json
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_array, checked_positions, put_in
+from dollop.checks import check_choice, check_positive, checked_array, checked_number, checked_positions, put_in
 from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
 from dollop.lab.outlines import Outline, gaps
 from dollop.lab.person import SHOULDERS
 from dollop.lab.rooms import LABORATORY, Part, Room
-from dollop.lab.scanner import MODELS, Scanner, SickLMS200
+from dollop.lab.scanner import Scanner, SickLMS200
 from dollop.pose import moved_pose
 
 __all__ = [
@@ -40,6 +41,10 @@ LOWEST_BEAM, HIGHEST_BEAM = 0.06, 1.4
 """m: a beam below meets the flat feet of cones, one above sees nobody over people's shoulders."""
 SHAPES = ("box", "cylinder", "cone")
 BODIES = ("torso", "legs")
+LARGEST, FARTHEST = 20.0, 1e6
+"""m: objects are no larger, and numbers no greater."""
+LONGEST, MOST_LAPS, FASTEST = 3600.0, 100, 5.0
+"""s, laps and m/s: nobody walks longer, and nobody runs."""
 FORMAT, VERSION = "dollop scene", 1
 
 
@@ -93,10 +98,10 @@ class Object:
         for name in ("position", "size"):
             object.__setattr__(self, name, tuple(checked_array(name, getattr(self, name), 2).tolist()))
         check_positive("size", min(self.size))
-        check_positive("height", self.height)
-        checked_array("turn", [self.turn], 1)
-        for name in ("top", "foot"):
-            check_positive(name, getattr(self, name), or_zero=True)
+        numbers = {"height": (1e-3, FARTHEST), "turn": (-FARTHEST, FARTHEST), "top": (0, 100), "foot": (0, 100)}
+        put_in(self, **{name: checked_number(name, getattr(self, name), *ends) for name, ends in numbers.items()})
+        if max(*self.size, self.height) > LARGEST:
+            raise ValueError(f"an object must be at most {LARGEST:g} m large, got {self.size} and {self.height}")
         if self.shape != "box" and self.size[0] != self.size[1]:
             raise ValueError(f"a {self.shape} must be as deep as wide, got {self.size}")
 
@@ -217,9 +222,12 @@ class Robot:
     def __post_init__(self):
         object.__setattr__(self, "pose", tuple(checked_array("the robot's pose", self.pose, 3).tolist()))
         object.__setattr__(self, "way", as_places("the robot's way", self.way))
-        for name in ("speed", "radius"):
-            check_positive(f"the robot's {name}", getattr(self, name))
-        checked_array("laser_ahead", [self.laser_ahead], 1)
+        put_in(self, speed=checked_number("the robot's speed", self.speed, 0.01, 2))
+        put_in(self, radius=checked_number("the robot's radius", self.radius, 0.05, 2))
+        put_in(self, laser_ahead=checked_number("laser_ahead", self.laser_ahead, -self.radius, self.radius))
+        if not isinstance(self.scanner, Scanner):
+            raise ValueError(f"the robot's scanner must be a Scanner, got {self.scanner!r:.60}")
+        checked_number("the beam height", self.beam_height)
         if not LOWEST_BEAM < self.beam_height < HIGHEST_BEAM:
             rule = f"the beam height must be over feet, {LOWEST_BEAM} m, and below shoulders, {HIGHEST_BEAM} m"
             raise ValueError(f"{rule}, got {self.beam_height} m")
@@ -281,20 +289,29 @@ class Person:
         if not self.places:
             raise ValueError("a person needs a place to be, got none")
         check_choice("body", self.body, BODIES)
-        if not 0.1 <= self.speed <= 3.0:
-            raise ValueError(f"a person walks at 0.1 to 3 m/s, got {self.speed}")
-        check_positive("begin", self.begin, or_zero=True)
-        check_positive("scatter", self.scatter, or_zero=True)
+        put_in(self, speed=checked_number("a person's speed", self.speed, 0.1, 3))
+        put_in(self, begin=checked_number("begin", self.begin, 0, LONGEST))
+        put_in(self, scatter=checked_number("scatter", self.scatter, 0, 1))
         check_choice("back", self.back, (False, True))
-        put_in(self, laps=whole("laps", self.laps, 1), seed=whole("seed", self.seed, 0))
+        put_in(self, laps=whole("laps", self.laps, 1, MOST_LAPS), seed=whole("seed", self.seed, 0, 2**63))
         for k, seconds in self.stops:
-            check_positive("the time of a stop", seconds)
+            checked_number("the time of a stop", seconds, 0.01, LONGEST)
             if k not in range(len(self.places)):
                 raise ValueError(f"a stop must be at one of {len(self.places)} places, got place {k}")
         put_in(self, stops=tuple((int(k), float(seconds)) for k, seconds in self.stops))
         if self.times and (len(self.times) != len(self.places) or min(np.diff(self.times), default=1) <= 0):
             rule = f"times must increase, one for each of {len(self.places)} places"
             raise ValueError(f"{rule}, got {len(self.times)}")
+        steps = np.linalg.norm(np.diff(self.places, axis=0), axis=1)
+        if self.times:
+            fastest = (steps / np.diff(self.times)).max(initial=0)
+            if fastest > FASTEST or np.ptp(self.times) > LONGEST:
+                rule = f"a replayed walk must be at most {FASTEST:g} m/s fast and {LONGEST:g} s long"
+                raise ValueError(f"{rule}, got {fastest:.1f} and {np.ptp(self.times):.1f}")
+        elif not steps.all():
+            raise ValueError(
+                f"a person's places must differ from one to the next, got {self.places[steps.argmin()]} twice"
+            )
 
 
 @dataclass(frozen=True)
@@ -323,14 +340,16 @@ class Move:
 
     def __post_init__(self):
         object.__setattr__(self, "to", tuple(checked_array("to", self.to, 2).tolist()))
-        check_positive("begin", self.begin, or_zero=True)
-        check_positive("seconds", self.seconds)
+        put_in(self, begin=checked_number("begin", self.begin, 0, LONGEST))
+        put_in(self, seconds=checked_number("seconds", self.seconds, 0.01, LONGEST))
 
 
-def whole(name, value, least):
-    """A whole number, not below the least, as an int."""
-    if not (least <= value < np.inf and value == int(value)):
-        raise ValueError(f"{name} must be a whole number, {least} or more, got {value}")
+def whole(name, value, least, most):
+    """A whole number within bounds as an int."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer) or not least <= value <= most:
+        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {value!r:.60}")
+    if value != int(value):
+        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {value}")
     return int(value)
 
 
@@ -411,6 +430,27 @@ class Scene:
         parts = [part.outline for part in self.room.parts if part.reaches(height)]
         objects = [each.outline(height) for each in self.objects]
         return tuple(parts + [each for each in objects if each is not None])
+
+    def object_at(self, k, t):
+        """Where an object stands at a time, moved or not.
+
+        Parameters
+        ----------
+        k : int
+            Which object.
+        t : float
+            In s.
+
+        Returns
+        -------
+        (2,) float array
+            In m.
+        """
+        place = np.array(self.objects[k].position)
+        for move in sorted(self.moves, key=lambda each: each.begin):
+            if move.object == k:
+                place = place + np.clip((t - move.begin) / move.seconds, 0.0, 1.0) * (np.array(move.to) - place)
+        return place
 
     def with_objects_at(self, positions):
         """The scene with its objects elsewhere.
@@ -498,16 +538,12 @@ class Scene:
         if content.get("version") is not VERSION:
             raise ValueError(f"the version of a scene must be {VERSION}, got {content.get('version')!r}")
         content = {name: value for name, value in content.items() if name not in ("format", "version")}
-        try:
-            room = made(Room, content["room"], furniture=lambda parts: tuple(made(Part, each) for each in parts))
-            robot = made(Robot, content["robot"], scanner=scanner_from)
-            lists = {"objects": Object, "people": Person, "moves": Move}
-            lists = {name: tuple(made(kind, each) for each in content[name]) for name, kind in lists.items()}
-            unknown = set(content) - {"room", "robot", *lists}
-        except (KeyError, TypeError, AttributeError, OverflowError) as error:
-            raise ValueError(f"a damaged scene: {type(error).__name__} {error}") from error
-        if unknown:
-            raise ValueError(f"a scene has no {', '.join(sorted(unknown))}")
+        check_names("a scene", content, {each.name for each in fields(cls)})
+        lists = {"objects": Object, "people": Person, "moves": Move}
+        lists = {name: all_made(name, kind, content[name]) for name, kind in lists.items()}
+        furniture = partial(all_made, "furniture", Part)
+        room = made("the room", Room, content["room"], furniture=furniture)
+        robot = made("the robot", Robot, content["robot"], scanner=partial(made, "the scanner", Scanner))
         return cls(room=room, robot=robot, **lists)
 
 
@@ -522,29 +558,31 @@ def plain(value):
     return value
 
 
-def made(kind, content, **parts):
-    """A record from what `plain` told of it; parts of it are made by functions."""
-    return kind(**{name: parts[name](value) if name in parts else value for name, value in content.items()})
+def made(where, kind, content, **parts):
+    """A record from what `plain` told of it; parts of it are made by functions; errors say where."""
+    names = {each.name for each in fields(kind)}
+    check_names(where, content, names)
+    values = {name: parts[name](value) if name in parts else value for name, value in content.items()}
+    try:
+        return kind(**values)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise ValueError(f"{where}: {error}") from error
 
 
-def scanner_from(content):
-    """A scanner as it was told of; a model on offer must have one of its own modes."""
-    scanner = Scanner(**content)
-    if scanner.model == "SICK LMS 200":
-        mode = "mm" if scanner.step == 0.001 else "cm" if scanner.step == 0.01 else f"{scanner.step:g} m"
-        errors = {name: getattr(scanner, name) for name in ("noise", "bias", "mixed", "jump", "missed")}
-        expected = SickLMS200(scanner.fov, scanner.resolution, mode, **errors)
-    elif scanner.model in MODELS:
-        errors = {name: getattr(scanner, name) for name in ("noise", "bias", "mixed", "jump", "missed")}
-        expected = MODELS[scanner.model](**errors)
-    else:
-        return scanner
-    for name, value in asdict(expected).items():
-        if not np.isclose(value, getattr(scanner, name)) if name != "model" else False:
-            raise ValueError(
-                f"{name} of a {scanner.model} must be {value:g} in this mode, got {getattr(scanner, name):g}"
-            )
-    return scanner
+def check_names(where, content, names):
+    """What is told of a record must be a dictionary with its names, all of them and no others."""
+    if not isinstance(content, dict):
+        raise ValueError(f"{where} must have {', '.join(sorted(names))}, got {type(content).__name__}")
+    for said, wrong in (("lacks", names - set(content)), ("cannot have", set(content) - names)):
+        if wrong:
+            raise ValueError(f"{where} {said} {', '.join(sorted(map(str, wrong))):.100}")
+
+
+def all_made(name, kind, content):
+    """A record of each in a list."""
+    if not isinstance(content, list):
+        raise ValueError(f"{name} must be a list, got {type(content).__name__}")
+    return tuple(made(f"{name}[{k}]", kind, each) for k, each in enumerate(content))
 
 
 # ---- what cannot be
@@ -578,11 +616,21 @@ def check_robot(scene):
     if robot.beam_height >= scene.room.height:
         rule = f"the beam must be below the top of the walls, {scene.room.height} m"
         raise ValueError(f"{rule}, got {robot.beam_height} m")
-    for name, place in (("the robot", robot.pose), *(("the robot's way", place) for place in robot.way)):
+    stretches = [np.linspace(a, b, 2 + int(np.hypot(*np.subtract(b, a)) / 0.1)) for a, b in robot_lines(robot)]
+    for name, place in (
+        ("the robot", robot.pose),
+        *(("the robot's way", place) for each in stretches for place in each),
+    ):
         disc = Outline(*place[:2], radius=robot.radius)
         check_free(scene, name, disc)
         for k in np.flatnonzero(gaps([each.footprint for each in scene.objects], disc) < 0):
             raise ValueError(f"{name} must not be in an object, got {rounded(place)} and object {k}")
+
+
+def robot_lines(robot):
+    """Where the straight lines of a robot's way begin and end, in m."""
+    places = [robot.pose[:2], *robot.way]
+    return zip(places[:-1], places[1:], strict=True)
 
 
 def check_people(scene):
@@ -591,6 +639,9 @@ def check_people(scene):
         for place, free in zip(person.places, scene.room.distance(person.places) > 0, strict=True):
             if not free:
                 raise ValueError(f"person {k} must walk in the room, got {rounded(place)}")
+        in_what = gaps([each.footprint for each in scene.objects], Outline(*person.places[0], radius=0.0))
+        for j in np.flatnonzero(in_what < 0):
+            raise ValueError(f"person {k} must not begin in an object, got {rounded(person.places[0])} and object {j}")
         for j in range(k):
             apart = np.linalg.norm(np.subtract(person.places[0], scene.people[j].places[0]))
             if apart < SHOULDERS:

@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from dollop.checks import checked_number, checked_positions
 from dollop.lab import person
 from dollop.lab.driving import ARRIVED, pursue
 from dollop.lab.people import walks_of
+from dollop.lab.person import check_room
 from dollop.lab.pioneer import Pioneer
 from dollop.lab.recording import MOVED_COLUMNS, ROBOT_COLUMNS, TRUTH_COLUMNS, Recording
+from dollop.lab.rooms import LABORATORY
 from dollop.lab.scenes import empty_scene, figure_eight_scene
-from dollop.lab.world import World, object_at
+from dollop.lab.world import World
 from dollop.laser import LaserLog
 from dollop.pose import moved_pose, wrapped
 from dollop.robot.control import PIONEER_LIMITS
@@ -25,6 +28,8 @@ TOUR = np.transpose(
     ]
 )
 """Way-points (K, 2) in m of the drive that shows the laser every side of the paper's laboratory."""
+PATIENCE = 120.0
+"""Time in s within which the robot reaches the next way-point, or never."""
 TOUR_LIMITS = PIONEER_LIMITS._replace(turn=1.75)
 """On that drive the robot may turn as fast as it can: 100 deg/s (Player, p2os)."""
 
@@ -55,8 +60,12 @@ def record(scene, seed, walks=None, duration=None):
         If nobody walks and no duration is given, or as `dollop.lab.people.walks_of`.
     """
     walks = walks_of(scene) if walks is None else tuple(walks)
-    if not walks and duration is None:
-        raise ValueError("a recording needs a person who walks, or a duration, got neither")
+    if duration is None and (not walks or len(walks[0].t) < 3):
+        raise ValueError("a recording needs a first person who walks, or a duration, got neither")
+    if duration is not None:
+        checked_number("duration", duration, 0.0, 86_400)
+    for walk in walks:
+        check_room(walk.positions, scene)
     rng, scanner = np.random.default_rng(seed), scene.robot.scanner
     t = np.arange(0.0, walks[0].t[-1] if duration is None else duration, 1 / scanner.rate)
     with World(scene, walks) as world:
@@ -116,7 +125,7 @@ def truth_of(scene, walks, t, true_poses):
         names = TRUTH_COLUMNS[1:] if k == 0 else [f"{name}_{k}" for name in TRUTH_COLUMNS[1:]]
         columns |= dict(zip(names, (x, y, heading), strict=True))
     for k in sorted({move.object for move in scene.moves}):
-        places = np.transpose([object_at(scene, k, time) for time in t])
+        places = np.transpose([scene.object_at(k, time) for time in t])
         columns |= dict(zip((f"{name}_{k}" for name in MOVED_COLUMNS), places, strict=True))
     if scene.robot.way:
         columns |= dict(zip(ROBOT_COLUMNS, true_poses.T, strict=True))
@@ -169,7 +178,7 @@ def record_figure_eights(seed, laps=5, scene=None, scanner=None, **gait):
     return record(scene, sensing, [person.figure_eight(scene, walking, laps, **gait)])
 
 
-def record_background(seed, scanner=None, scene=None, tour=TOUR):
+def record_background(seed, scanner=None, scene=None, tour=None):
     """Drive through the empty laboratory and log the laser with true poses, for a map (Sec. II).
 
     The paper's robot mapped its laboratory by CARMEN; here the poses are known.
@@ -183,19 +192,32 @@ def record_background(seed, scanner=None, scene=None, tour=TOUR):
     scene : Scene, optional
         Of another room.
     tour : (K, 2) array_like, optional
-        Way-points in m; those of the paper's laboratory when not given.
+        Way-points in m, straight lines between which are free; of another room they must be given.
 
     Returns
     -------
     LaserLog
+
+    Raises
+    ------
+    ValueError
+        If a scene of another room comes without a tour, or a way-point is not reached.
     """
+    if tour is None:
+        if scene is not None and scene.room is not LABORATORY:
+            raise ValueError("another room needs a tour of its own, got none")
+        tour = TOUR
     scene, rng = scene or empty_scene(), np.random.default_rng(seed)
     scanner = scanner or scene.robot.scanner
     poses, ranges = [], []
     with World(scene) as world:
         robot = Pioneer(world, scene.robot.pose, limits=TOUR_LIMITS, scanner=scanner)
-        for goal in tour:
+        for goal in checked_positions("tour", tour):
+            begun = len(poses)
             while np.linalg.norm(goal - robot.pose[:2]) > ARRIVED:
+                if len(poses) - begun > PATIENCE * scanner.rate:
+                    told = f"got {goal.tolist()}, not reached within {PATIENCE:g} s"
+                    raise ValueError(f"the places of a tour must be free and the way to them as well, {told}")
                 poses.append(robot.laser_pose)
                 ranges.append(world.scan(poses[-1], rng, scanner))
                 robot.drive(*pursue(robot.pose, goal))
@@ -226,7 +248,11 @@ def record_tour(scene, places, seed, stride=0.15, turns=12):
     LaserLog
     """
     rng, scanner = np.random.default_rng(seed), scene.robot.scanner
-    places = np.asarray(places, dtype=float)
+    places = checked_positions("places", places)
+    checked_number("stride", stride, 0.01)
+    checked_number("turns", turns, 1)
+    if not len(places) or not (scene.room.distance(places) > 0).all():
+        raise ValueError(f"the places of a tour must be in the room and free, got {places.tolist()!r:.100}")
     poses = [(*places[0], theta) for theta in np.arange(turns) * 2 * np.pi / turns]
     for begin, end in zip(places[:-1], places[1:], strict=True):
         heading = np.arctan2(*(end - begin)[::-1])

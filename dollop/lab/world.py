@@ -6,7 +6,7 @@ from dollop.lab.engine import Engine, Solid
 from dollop.lab.person import DEPTH, LEG_RADIUS, SHOULDERS, body_offsets
 from dollop.pose import rotation
 
-__all__ = ["World", "object_at"]
+__all__ = ["World"]
 
 AWAY = (0.0, 0.0, -10.0)
 HULL = 0.24
@@ -65,7 +65,7 @@ class World:
             for body, offset in zip(bodies, body_offsets(walk.body, phase), strict=True):
                 self.engine.place(body, (*(position + rotation(heading) @ offset), height), heading)
         for k in {move.object for move in self.scene.moves}:
-            self.engine.place(self._objects[k], (*object_at(self.scene, k, t), 0.0))
+            self.engine.place(self._objects[k], (*self.scene.object_at(k, t), 0.0))
 
     def cast(self, pose, angles, reach):
         """True distance along each beam of a laser.
@@ -107,29 +107,6 @@ class World:
         """
         scanner = scanner or self.scene.robot.scanner
         return scanner.report(self.cast(pose, scanner.angles, scanner.max_range), rng)
-
-
-def object_at(scene, k, t):
-    """Where an object stands at a time, moved or not.
-
-    Parameters
-    ----------
-    scene : Scene
-    k : int
-        Which object.
-    t : float
-        In s.
-
-    Returns
-    -------
-    (2,) float array
-        In m.
-    """
-    place = np.array(scene.objects[k].position)
-    for move in sorted(scene.moves, key=lambda each: each.begin):
-        if move.object == k:
-            place = place + np.clip((t - move.begin) / move.seconds, 0.0, 1.0) * (np.array(move.to) - place)
-    return place
 
 
 def solid_of_part(part, beam_height):

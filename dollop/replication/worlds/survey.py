@@ -67,6 +67,8 @@ def read_table(path):
         if list(table.columns) != list(COLUMNS):
             raise ValueError(f"columns must be {', '.join(COLUMNS)}, got {', '.join(table.columns)}")
         unknown = set(table.outcome) - set(OUTCOMES)
+        if table.seed.duplicated().any():
+            raise ValueError(f"seeds must be there once, got {table.seed[table.seed.duplicated()].iloc[0]} twice")
         if unknown:
             raise ValueError(f"an outcome must be one of {', '.join(OUTCOMES)}, got {unknown.pop()!r}")
         return as_table(table)
@@ -178,11 +180,16 @@ def row(cells):
 
 
 def worst_seeds(table):
-    """The seeds of the worst worlds: silently wrong, by the least share of trajectory, walk and law right."""
+    """The seeds of the worst worlds, each kind's worst first.
+
+    They are silently wrong, ordered by the least share of trajectory, walk and law that is right.
+    """
     wrong = table[table.outcome == "silently wrong"]
     shares = wrong[["user_right", "covered", "law_covered"]].replace("", "1").astype(float)
     kept = shares.assign(law=1 - wrong.law_astray.replace("", "0").astype(float)).min(axis=1)
-    return kept.sort_values(kind="stable").index[:WORST].tolist()
+    order = kept.sort_values(kind="stable").index
+    of_a_kind = wrong.loc[order].groupby("kind").cumcount()
+    return of_a_kind.sort_values(kind="stable").index[:WORST].tolist()
 
 
 def draw_sheet(seeds, path):
@@ -229,7 +236,7 @@ def command(options):
         When interrupted, with the words where it goes on.
     """
     count = (QUICK_SEEDS if options.quick else SEEDS) if options.seeds is None else options.seeds
-    if count < 1 or options.first_seed < 0:
+    if count < 1 or not 0 <= options.first_seed <= 2**31 - count:
         raise ValueError(f"worlds need a seed or more, from 0 on, got {count} from {options.first_seed} on")
     need("lab")
     folder = options.folder or Path("study-quick" if options.quick else "study")
@@ -246,6 +253,7 @@ def publish(table, folder):
     found = summary(table)
     first = folder / FIRST
     before = summary(read_table(first)) if first.exists() else None
+    before = None if before == found else before
     for kind, counts in found["kinds"].items():
         print(f"{kind:15}" + "".join(f"{name} {count:<5}" for name, count in counts.items()))
     with whole_file(folder / "worlds.json", "w") as stream:
