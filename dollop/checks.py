@@ -2,7 +2,15 @@
 
 import numpy as np
 
-__all__ = ["check_choice", "check_positive", "checked_array", "checked_number", "checked_positions", "put_in"]
+__all__ = [
+    "check_choice",
+    "check_positive",
+    "checked_array",
+    "checked_number",
+    "checked_numbers",
+    "checked_positions",
+    "put_in",
+]
 
 FARTHEST = 1e9
 """m from the origin: coordinates beyond are no metres, and their squares would overflow."""
@@ -103,6 +111,33 @@ def checked_array(name, values, *shape, finite=True):
     if finite and not np.isfinite(array).all():
         row = np.argwhere(~np.isfinite(array))[0, 0]
         raise ValueError(f"{name} must be finite, got {array[row].tolist()} in row {row}")
+    return array
+
+
+def checked_numbers(name, values, *shape):
+    """As `checked_array`, but text is no number, nor are True and False.
+
+    Parameters
+    ----------
+    name : str
+        What to call it in the error.
+    values : array_like
+    *shape : int or str
+        The size wanted along each axis; a letter stands for any.
+
+    Returns
+    -------
+    float array
+        A copy.
+
+    Raises
+    ------
+    ValueError
+        As `checked_array`.
+    """
+    array = checked_array(name, values, *shape)
+    if any(isinstance(value, str | bool | np.bool_) for value in np.array(values, dtype=object).flat):
+        raise ValueError(f"{name} must be numbers, got {values!r:.60}")
     return array
 
 

@@ -68,6 +68,12 @@ def random_object(rng, room):
     return Object(str(shape), random_place(rng, room, width / 2), size, centimetres(rng, 0.15, 1.5), **look)
 
 
+def random_times(rng, places):
+    """When somebody is at each place, nowhere faster than 4 m/s."""
+    apart = np.linalg.norm(np.diff(places, axis=0, prepend=places[:1]), axis=1)
+    return np.cumsum(np.maximum(rng.uniform(0.1, 3.0, len(places)), apart / 4.0))
+
+
 def random_person(rng, scene):
     """Who walks about, not beginning at the robot, and all that can be said of it."""
     places = [random_place(rng, scene.room) for _ in range(rng.integers(1, 5))]
@@ -82,7 +88,7 @@ def random_person(rng, scene):
         laps=int(rng.integers(1, 4)),
         back=bool(rng.integers(2)),
         scatter=rng.uniform(0.0, 0.1),
-        times=np.cumsum(rng.uniform(0.1, 3.0, len(places))) if rng.integers(3) == 0 else (),
+        times=random_times(rng, places) if rng.integers(3) == 0 else (),
         seed=int(rng.integers(1000)),
     )
 

@@ -1,5 +1,6 @@
 """Checks of numbers and arrays: what is right passes as it is, and errors name value and rule."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from dollop.checks import check_choice, check_positive, checked_array, checked_positions, put_in
+from dollop.checks import (
+    FARTHEST,
+    check_choice,
+    check_positive,
+    checked_array,
+    checked_number,
+    checked_positions,
+    put_in,
+)
 
 NUMBERS = st.floats(-1e9, 1e9)
 
@@ -66,6 +75,45 @@ def test_what_is_not_finite_is_named_with_its_row():
     with pytest.raises(ValueError, match=r"^poses must be finite, got \[nan, 2.0\] in row 1$"):
         checked_array("poses", values, "N", 2)
     assert np.isnan(checked_array("poses", values, "N", 2, finite=False)[1, 0])
+
+
+@pytest.mark.parametrize("values", [[["far", 1.0]], [[10**400, 1.0]], [[1.0], [1.0, 2.0]], {"a": 1}])
+def test_an_array_is_of_numbers_in_rows_of_one_length(values):
+    """Text, what no float holds, rows of several lengths and a dictionary raise ValueError that names them."""
+    with pytest.raises(ValueError, match=r"^boxes must be numbers in rows of one length, got [\[{]"):
+        checked_array("boxes", values, "N", 2)
+
+
+@given(st.one_of(st.floats(), st.integers()), st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
+def test_a_number_is_finite_and_in_its_bounds(value, one, other):
+    """It comes back as a float if it is, bounds included; if not, the error names name, rule and value."""
+    least, most = sorted((one, other))
+    if least <= value <= most:
+        number = checked_number("turn", value, least, most)
+        assert number == value and isinstance(number, float)
+        return
+    rule = "in .* to .*" if abs(value) <= FARTHEST else r"a finite number within 1e\+09"
+    with pytest.raises(ValueError, match=f"^turn must be {rule}, got {re.escape(str(value)[:60])}"):
+        checked_number("turn", value, least, most)
+
+
+@pytest.mark.parametrize("value", [np.float32(0.5), np.int64(3), np.float64(0.5), 7, -0.0])
+def test_numbers_of_numpy_are_numbers(value):
+    """They come back as floats of Python."""
+    assert type(checked_number("turn", value)) is float and checked_number("turn", value, value, value) == value
+
+
+@pytest.mark.parametrize("value", ["0.4", b"1", True, np.False_, None, [1.0], np.array([1.0]), {}, 1j])
+def test_what_is_no_number_is_named(value):
+    """Text, a bool, nothing and what holds numbers are none."""
+    with pytest.raises(ValueError, match=f"^turn must be a finite number, got {re.escape(repr(value))}$"):
+        checked_number("turn", value)
+
+
+def test_what_no_float_holds_is_cut_short():
+    """A whole number of 401 digits is refused, and 60 of them are told."""
+    with pytest.raises(ValueError, match=r"^turn must be a finite number within 1e\+09, got 10{59}$"):
+        checked_number("turn", 10**400)
 
 
 def test_positions_lie_in_the_plane_and_on_this_planet():

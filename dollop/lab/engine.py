@@ -363,7 +363,8 @@ class Engine:
         (height, width, 3) uint8 array
         """
         eye, target = self._recentred(eye, target)
-        lens = pybullet.computeProjectionMatrixFOV(view_angle, width / height, 0.1, 20.0)
+        farthest = max(20.0, 2 * np.linalg.norm(np.subtract(eye, target)))
+        lens = pybullet.computeProjectionMatrixFOV(view_angle, width / height, 0.1, farthest)
         pixels = self._call(
             "getCameraImage",
             SUPERSAMPLING * width,

@@ -17,6 +17,7 @@ from dollop.lab.outlines import outline_distances
 from dollop.lab.person import DEPTH, SHOULDERS, TIME_STEP, Walk, check_room, walk, walk_along
 from dollop.lab.scenes import Person
 from dollop.pose import rotation
+from dollop.trajectory import arc_length
 
 __all__ = ["find_way", "free_places", "read_walks", "replay", "walk_of", "walks_of"]
 
@@ -126,7 +127,7 @@ def walks_of(scene):
     walks = tuple(walk_of(person, scene) for person in scene.people)
     if not walks:
         return walks
-    t = np.arange(0.0, max(each.t[-1] for each in walks), 0.1)
+    t = np.arange(0.0, settled(scene, walks), 0.1)
     ways = [np.column_stack([np.interp(t, each.t, axis) for axis in each.positions.T]) for each in walks]
     for i, way in enumerate(ways):
         for j in range(i):
@@ -144,6 +145,13 @@ def walks_of(scene):
             away[moving] = [outline_distances([at], [each])[0, 0] for at, each in zip(way[moving], there, strict=True)]
             check_apart(away, DEPTH / 2, t, f"person {i} and object {k}, when moved,")
     return walks
+
+
+def settled(scene, walks):
+    """Time in s after which nothing moves any more; a robot that drives is given twice the time that it needs."""
+    ends = [each.t[-1] for each in walks] + [move.begin + move.seconds for move in scene.moves]
+    driven = arc_length(np.array([scene.robot.pose[:2], *scene.robot.way]))[-1] if scene.robot.way else 0.0
+    return max([*ends, 2 * driven / scene.robot.speed]) + 0.2
 
 
 def check_apart(distances, least, t, who):

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_array, checked_number, checked_positions, put_in
+from dollop.checks import check_choice, check_positive, checked_number, checked_numbers, checked_positions, put_in
 from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
 from dollop.lab.outlines import Outline, gaps
 from dollop.lab.person import SHOULDERS
@@ -96,7 +96,7 @@ class Object:
     def __post_init__(self):
         check_choice("shape", self.shape, SHAPES)
         for name in ("position", "size"):
-            object.__setattr__(self, name, tuple(checked_array(name, getattr(self, name), 2).tolist()))
+            object.__setattr__(self, name, tuple(checked_numbers(name, getattr(self, name), 2).tolist()))
         check_positive("size", min(self.size))
         numbers = {"height": (1e-3, FARTHEST), "turn": (-FARTHEST, FARTHEST), "top": (0, 100), "foot": (0, 100)}
         put_in(self, **{name: checked_number(name, getattr(self, name), *ends) for name, ends in numbers.items()})
@@ -220,7 +220,7 @@ class Robot:
     radius: float = 0.25
 
     def __post_init__(self):
-        object.__setattr__(self, "pose", tuple(checked_array("the robot's pose", self.pose, 3).tolist()))
+        object.__setattr__(self, "pose", tuple(checked_numbers("the robot's pose", self.pose, 3).tolist()))
         object.__setattr__(self, "way", as_places("the robot's way", self.way))
         put_in(self, speed=checked_number("the robot's speed", self.speed, 0.01, 2))
         put_in(self, radius=checked_number("the robot's radius", self.radius, 0.05, 2))
@@ -285,7 +285,7 @@ class Person:
 
     def __post_init__(self):
         object.__setattr__(self, "places", as_places("a person's places", self.places))
-        object.__setattr__(self, "times", tuple(checked_array("times", self.times, "K").tolist()))
+        object.__setattr__(self, "times", tuple(checked_numbers("times", self.times, "K").tolist()))
         if not self.places:
             raise ValueError("a person needs a place to be, got none")
         check_choice("body", self.body, BODIES)
@@ -296,7 +296,7 @@ class Person:
         put_in(self, laps=whole("laps", self.laps, 1, MOST_LAPS), seed=whole("seed", self.seed, 0, 2**63))
         for k, seconds in self.stops:
             checked_number("the time of a stop", seconds, 0.01, LONGEST)
-            if k not in range(len(self.places)):
+            if isinstance(k, bool) or k not in range(len(self.places)):
                 raise ValueError(f"a stop must be at one of {len(self.places)} places, got place {k}")
         put_in(self, stops=tuple((int(k), float(seconds)) for k, seconds in self.stops))
         if self.times and (len(self.times) != len(self.places) or min(np.diff(self.times), default=1) <= 0):
@@ -339,7 +339,7 @@ class Move:
     seconds: float = 1.0
 
     def __post_init__(self):
-        object.__setattr__(self, "to", tuple(checked_array("to", self.to, 2).tolist()))
+        object.__setattr__(self, "to", tuple(checked_numbers("to", self.to, 2).tolist()))
         put_in(self, begin=checked_number("begin", self.begin, 0, LONGEST))
         put_in(self, seconds=checked_number("seconds", self.seconds, 0.01, LONGEST))
 
@@ -355,7 +355,9 @@ def whole(name, value, least, most):
 
 def as_places(name, values):
     """Places (K, 2) as a tuple of tuples."""
-    return tuple(map(tuple, checked_positions(name, values).tolist())) if len(values) else ()
+    if isinstance(values, tuple | list) and not values:
+        return ()
+    return tuple(map(tuple, checked_positions(name, checked_numbers(name, values, "N", 2)).tolist()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -469,7 +471,7 @@ class Scene:
         ValueError
             If an object does not stand free there.
         """
-        places = checked_array("positions", positions, len(self.objects), 2)
+        places = checked_numbers("positions", positions, len(self.objects), 2)
         return replace(self, objects=tuple(map(Object.at, self.objects, places)))
 
     def save(self, path):
@@ -653,8 +655,9 @@ def check_moves(scene):
     """Moves are of objects that there are, to places that are free when it is done."""
     objects = list(scene.objects)
     for move in sorted(scene.moves, key=lambda each: each.begin):
-        if not (isinstance(move.object, int) and 0 <= move.object < len(scene.objects)):
-            raise ValueError(f"a move must be of one of {len(scene.objects)} objects, got object {move.object}")
+        known = isinstance(move.object, int | np.integer) and not isinstance(move.object, bool)
+        if not (known and 0 <= move.object < len(scene.objects)):
+            raise ValueError(f"a move must be of one of {len(scene.objects)} objects, got {move.object!r:.60}")
         name, each = f"object {move.object}, when moved,", objects[move.object].at(move.to)
         check_free(scene, name, each.footprint)
         objects[move.object] = each

@@ -136,6 +136,7 @@ def test_the_same_seed_walks_the_same_walk():
 
 
 GOING, COMING = Person([(3.0, 2.0), (9.0, 2.0)]), Person([(9.0, 2.1), (3.0, 2.1)])
+BESIDE, DRIVES = Person([(3.0, 5.0), (9.0, 5.0)]), Robot((3.0, 2.0, 0.0), way=[(9.0, 2.0)])
 CARTON = Object("box", (6.0, 2.0), (1.0, 0.6), 0.8, turn=0.3)
 APART = r"people 0 and 1 must keep 0\.25 m apart, got 0\.\d\d m at \d\.\d s"
 IN_THE_WAY = {
@@ -147,10 +148,26 @@ IN_THE_WAY = {
         replace(TWO_ROOMS, people=[Person([(1, 1), (5, 1)], times=(0, 4))]),
         r"0\.0 m .* background, got -0\.\d+ m at",
     ),
-    "where one stands": (replace(HALL, objects=[CARTON], people=[Person([(6.0, 2.0)])]), "got object 0 at"),
+    "where one stands": (replace(HALL, objects=[CARTON], people=[Person([(6.0, 2.4)])]), "got object 0 at"),
     "what was moved": (
         replace(HALL, objects=[CARTON.at((6.0, 4.0))], people=[GOING], moves=[Move(0, 0.0, (6.0, 2.0))]),
         r"person 0 and object 0, when moved, must keep 0\.12 m apart, got -0\.\d\d m at",
+    ),
+    "what sweeps over who stands": (
+        replace(HALL, objects=[CARTON], people=[BESIDE, Person([(8.0, 2.0)])], moves=[Move(0, 1.0, (10.0, 2.0), 2.0)]),
+        r"person 1 and object 0, when moved, must keep 0\.12 m apart, got -0\.\d\d m at \d\.\d s",
+    ),
+    "what sweeps over who walks": (
+        replace(HALL, objects=[CARTON], people=[Person([(8.0, 3.0), (8.0, 0.8)])], moves=[Move(0, 1.0, (10, 2), 4.0)]),
+        r"person 0 and object 0, when moved, must keep 0\.12 m apart, got -?0\.\d\d m at \d\.\d s",
+    ),
+    "the robot that drives, as one comes": (
+        replace(HALL, robot=DRIVES, people=[Person([(9.0, 2.0), (3.0, 2.1)])]),
+        r"person 0 and the robot that drives must keep 0\.38 m apart, got 0\.\d\d m at \d\.\d s",
+    ),
+    "the robot that drives, as one stands": (
+        replace(HALL, robot=DRIVES, people=[Person([(3.0, 6.0), (20.0, 6.0)]), Person([(6.0, 2.0)])]),
+        r"person 1 and the robot that drives must keep 0\.38 m apart, got 0\.\d\d m at \d+\.\d s",
     ),
     "the robot": (
         replace(HALL, robot=Robot((6.0, 2.0, 0.0)), people=[GOING]),
@@ -161,9 +178,36 @@ IN_THE_WAY = {
 
 @pytest.mark.parametrize(("scene", "rule"), IN_THE_WAY.values(), ids=IN_THE_WAY)
 def test_nobody_walks_through_anything(scene, rule):
-    """A wall, a carton, somebody who comes or stands, and the robot raise ValueError that says where or when."""
+    """A wall, a carton, also when moved, somebody who comes or stands, and the robot raise ValueError that says so."""
     with pytest.raises(ValueError, match=rule):
         walks_of(scene)
+
+
+ONE_WHO_STANDS = [
+    (replace(HALL, robot=DRIVES, people=[Person([(6.0, 2.0)])]), "person 0 and the robot that drives must keep"),
+    (
+        replace(HALL, objects=[CARTON], people=[Person([(8.0, 2.0)])], moves=[Move(0, 1.0, (10.0, 2.0))]),
+        "person 0 and object 0, when moved, must keep",
+    ),
+    (
+        replace(HALL, robot=DRIVES, people=[Person([(8.5, 4.0), (8.5, 2.0)], speed=2.0, begin=0.0)]),
+        "person 0 and the robot that drives must keep",
+    ),
+]
+
+
+@pytest.mark.parametrize(("scene", "rule"), ONE_WHO_STANDS)
+def test_who_stands_for_good_is_not_run_over(scene, rule):
+    """When nobody walks any more, a robot or an object that comes later is in the way as well."""
+    with pytest.raises(ValueError, match=rule):
+        walks_of(scene)
+
+
+def test_a_moved_object_and_a_driving_robot_pass_by():
+    """What is moved when somebody has gone, and a robot that drives along a walk beside it, are no error."""
+    gone = Person([(8.0, 2.0), (8.0, 6.0)], begin=0.0)
+    late = replace(HALL, objects=[CARTON], people=[gone], moves=[Move(0, 8.0, (10.0, 2.0), 2.0)])
+    assert len(walks_of(late)) == len(walks_of(replace(HALL, robot=DRIVES, people=[BESIDE]))) == 1
 
 
 def test_people_pass_each_other_where_there_is_room():
@@ -253,23 +297,34 @@ BAD_PEOPLE = [
     ({"places": []}, "needs a place to be, got none"),
     ({"places": [(1.0, np.nan), (2.0, 2.0)]}, "a person's places must be finite, got .*nan"),
     ({"places": [(1.0, 2.0, 3.0)]}, r"a person's places must have shape \(N, 2\), got \(1, 3\)"),
-    ({"speed": 0.05}, "0.1 to 3 m/s, got 0.05"),
-    ({"speed": np.nan}, "0.1 to 3 m/s, got nan"),
+    ({"speed": 0.05}, "a person's speed must be in 0.1 to 3, got 0.05"),
+    ({"speed": np.nan}, r"a person's speed must be a finite number within 1e\+09, got nan"),
     ({"body": "head"}, "body must be one of 'torso', 'legs', got 'head'"),
-    ({"begin": -1.0}, "begin must be finite and not negative, got -1.0"),
+    ({"body": "robot"}, "body must be one of 'torso', 'legs', got 'robot'"),
+    ({"begin": -1.0}, "begin must be in 0 to 3600, got -1.0"),
+    ({"begin": 1e9}, "begin must be in 0 to 3600, got 1000000000.0"),
+    ({"begin": 1e10}, r"begin must be a finite number within 1e\+09, got 10000000000.0"),
     ({"stops": [(2, 1.0)]}, "a stop must be at one of 2 places, got place 2"),
     ({"stops": [(-1, 1.0)]}, "a stop must be at one of 2 places, got place -1"),
     ({"stops": [(0.5, 1.0)]}, "a stop must be at one of 2 places, got place 0.5"),
     ({"stops": [(np.nan, 1.0)]}, "a stop must be at one of 2 places, got place nan"),
-    ({"stops": [(0, 0.0)]}, "the time of a stop must be positive and finite, got 0.0"),
-    ({"laps": 0}, "laps must be a whole number, 1 or more, got 0"),
-    ({"laps": 1.5}, "laps must be a whole number, 1 or more, got 1.5"),
-    ({"laps": np.inf}, "laps must be a whole number, 1 or more, got inf"),
-    ({"scatter": -0.1}, "scatter must be finite and not negative, got -0.1"),
+    ({"stops": [(0, 0.0)]}, "the time of a stop must be in 0.01 to 3600, got 0.0"),
+    ({"stops": [(99, 1.0)]}, "a stop must be at one of 2 places, got place 99"),
+    ({"stops": [(0, 3601.0)]}, "the time of a stop must be in 0.01 to 3600, got 3601.0"),
+    ({"laps": 0}, "laps must be a whole number, 1 to 100, got 0"),
+    ({"laps": 10**9}, "laps must be a whole number, 1 to 100, got 1000000000"),
+    ({"laps": 1.5}, "laps must be a whole number, 1 to 100, got 1.5"),
+    ({"laps": np.inf}, "laps must be a whole number, 1 to 100, got inf"),
+    ({"scatter": -0.1}, "scatter must be in 0 to 1, got -0.1"),
+    ({"scatter": 1.1}, "scatter must be in 0 to 1, got 1.1"),
+    ({"back": 2}, "back must be one of False, True, got 2"),
+    ({"places": [(1, 1), (1, 1), (2, 2)]}, r"must differ from one to the next, got \(1.0, 1.0\) twice"),
+    ({"times": [0.0, 0.2]}, "at most 5 m/s fast and 3600 s long, got 7.1 and 0.2"),
+    ({"times": [0.0, 3601.0]}, "at most 5 m/s fast and 3600 s long, got 0.0 and 3601.0"),
     ({"times": [1.0]}, "times must increase, one for each of 2 places, got 1"),
     ({"times": [1.0, 1.0]}, "times must increase, one for each of 2 places"),
     ({"times": [1.0, np.nan]}, "times must be finite, got nan"),
-    ({"seed": -1}, "seed must be a whole number, 0 or more, got -1"),
+    ({"seed": -1}, "seed must be a whole number, 0 to 9223372036854775808, got -1"),
 ]
 
 
@@ -280,9 +335,18 @@ def test_a_person_that_cannot_be_is_refused(said, rule):
         Person(**({"places": [(1.0, 1.0), (2.0, 2.0)]} | said))
 
 
+def test_who_is_replayed_may_stay_and_run_and_who_runs_faster_is_none():
+    """The same place at two times is a pause; 4.9 m in a second can be replayed and 5.1 m cannot."""
+    assert Person([(1.0, 1.0), (1.0, 1.0)], times=(0.0, 1.0)).times == (0.0, 1.0)
+    assert replay([(0.0, 0.0, 0.0), (1.0, 4.9, 0.0)], (1.0, 2.0), 0.0).times == (0.0, 1.0)
+    with pytest.raises(ValueError, match="a replayed walk must be at most 5 m/s fast .*, got 5.1 and 1.0"):
+        replay([(0.0, 0.0, 0.0), (1.0, 5.1, 0.0)], (1.0, 2.0), 0.0)
+
+
 BAD_MOVES = [
-    ({"begin": -1.0}, "begin must be finite and not negative, got -1.0"),
-    ({"seconds": 0.0}, "seconds must be positive and finite, got 0.0"),
+    ({"begin": -1.0}, "begin must be in 0 to 3600, got -1.0"),
+    ({"begin": 1e9}, "begin must be in 0 to 3600, got 1000000000.0"),
+    ({"seconds": 0.0}, "seconds must be in 0.01 to 3600, got 0.0"),
     ({"to": (np.nan, 1.0)}, "to must be finite, got nan"),
     ({"to": (1.0,)}, r"to must have shape \(2,\), got \(1,\)"),
 ]
@@ -317,12 +381,20 @@ def test_walks_are_read_from_files(tmp_path):
         assert walk[-1, :2] == pytest.approx([30 / 29.97, 1.0])
 
 
-DAMAGE = {"empty.csv": b"", "other.csv": b"a,b\n1,2\n", "cut.csv.gz": b"\x1f\x8b\x08\x00", "noise.csv.gz": b"id,frame"}
+HEAD = b"id,frame,label,x_est,y_est\n"
+DAMAGE = {
+    "empty.csv": b"",
+    "other.csv": b"a,b\n1,2\n",
+    "cut.csv.gz": b"\x1f\x8b\x08\x00",
+    "noise.csv.gz": b"id,frame",
+    "text_as_a_frame.csv": HEAD + b"1,first,ped,0.0,0.0\n1,second,ped,0.0,0.1\n",
+    "text_as_a_place.csv": HEAD + b"1,0,ped,here,0.0\n1,1,ped,0.0,0.1\n",
+}
 
 
 @pytest.mark.parametrize("name", DAMAGE)
 def test_what_is_no_table_of_walks_is_named(tmp_path, name):
-    """An empty, foreign or damaged file raises FormatError that names it."""
+    """An empty, foreign or damaged file, and text in place of a number, raise FormatError that names it."""
     (tmp_path / name).write_bytes(DAMAGE[name])
     with pytest.raises(FormatError, match=name):
         read_walks(tmp_path)

@@ -126,6 +126,30 @@ def test_impossible_walks_are_refused():
         walk([(2.0, 3.0), (7.0, 3.0)], carton, 0)
 
 
+BAD_WALKS = [
+    ({"speed": -1}, "speed must be in 0.1 to 3, got -1"),
+    ({"speed": "1"}, "speed must be a finite number, got '1'"),
+    ({"speed": 10**400}, r"speed must be a finite number within 1e\+09, got 1000"),
+    ({"stops": [(99, 1.0)]}, "at one of 2 places for 0 s or more, got 99 and 1.0"),
+    ({"stops": [(-1, 1.0)]}, "at one of 2 places for 0 s or more, got -1 and 1.0"),
+    ({"stops": [(1, -1.0)]}, "at one of 2 places for 0 s or more, got 1 and -1.0"),
+    ({"stand": -1.0}, "at one of 2 places for 0 s or more, got 0 and -1.0"),
+    ({"stand": (0.0, np.inf)}, "at one of 2 places for 0 s or more, got 0 and inf"),
+    ({"body": "robot"}, "body must be one of 'torso', 'legs', got 'robot'"),
+    ({"from_background": -0.1}, "from_background must be in 0 to inf, got -0.1"),
+    ({"points": [(3.0, 3.0)]}, r"two via-points or more, none twice in a row, got \[\[3.0, 3.0\]\]"),
+    ({"points": [(3, 3), (3, 3), (6, 3)]}, "two via-points or more, none twice in a row, got"),
+    ({"points": [(3.0, np.nan), (6.0, 3.0)]}, "via-points of a walk must be finite"),
+]
+
+
+@pytest.mark.parametrize(("said", "rule"), BAD_WALKS)
+def test_a_walk_that_cannot_be_is_refused(said, rule):
+    """A number out of its range, a stop nowhere, an unknown body, and too few via-points raise ValueError."""
+    with pytest.raises(ValueError, match=rule):
+        walk(**({"points": [(3.0, 3.0), (6.0, 3.0)], "scene": Scene(), "seed": 0} | said))
+
+
 def test_a_walk_keeps_as_far_from_the_background_as_it_is_told():
     """A way 0.4 m before a wall leaves a shoulder some room: enough if none is asked for, too little for 0.3 m."""
     scene, points = Scene(), [(3.0, 0.4), (6.0, 0.4)]

@@ -82,8 +82,8 @@ DAMAGED_SCENES = {
     "another version": (lambda scene: scene | {"version": 7}, "the version of a scene must be 1, got 7"),
     "another format": (lambda scene: scene | {"format": "map"}, "not a scene: format must be 'dollop scene'"),
     "an older time's": (lambda scene: {"kinds": ["cone"], "positions": [[4, 3]], "robot": [4, 1, 0]}, "not a scene"),
-    "a missing part": (lambda scene: {k: v for k, v in scene.items() if k != "moves"}, "KeyError 'moves'"),
-    "an unknown part": (lambda scene: scene | {"ghosts": []}, "a scene has no ghosts"),
+    "a missing part": (lambda scene: {k: v for k, v in scene.items() if k != "moves"}, "a scene lacks moves"),
+    "an unknown part": (lambda scene: scene | {"ghosts": []}, "a scene cannot have ghosts"),
     "another mode": (
         lambda scene: with_scanner(scene, resolution=0.25),
         "fov/resolution must be one of .*180/0.25",
@@ -92,7 +92,18 @@ DAMAGED_SCENES = {
     "NaN": (lambda scene: scene | {"robot": scene["robot"] | {"speed": float("nan")}}, "speed must be .*, got nan"),
     "no room": (lambda scene: scene | {"objects": 2 * scene["objects"]}, "objects must not stand in each other"),
     "a list": (lambda scene: [scene], "not a scene"),
-    "too large": (lambda scene: scene | {"room": scene["room"] | {"height": 10**400}}, "OverflowError"),
+    "too large": (
+        lambda scene: scene | {"room": scene["room"] | {"height": 10**400}},
+        r"the room: the height of a room must be a finite number within 1e\+09, got 1000000",
+    ),
+    "text": (
+        lambda scene: scene | {"robot": scene["robot"] | {"radius": "0.25"}},
+        "the robot: the robot's radius must be a finite number, got '0.25'",
+    ),
+    "true": (
+        lambda scene: scene | {"objects": [scene["objects"][0] | {"height": True}]},
+        r"objects\[0\]: height must be a finite number, got True",
+    ),
 }
 
 

@@ -92,18 +92,33 @@ def test_a_room_holds_what_is_against_a_wall_and_not_in_it(x, y, held):
     assert not room.holds(Outline(x + 9.0, y, radius=0.3))
 
 
-CABINET = Part("box", (5.0, 1.0, 0.5), (1.0, 1.0, 1.0))
+CABINET, SUNK = Part("box", (5.0, 1.0, 0.5), (1.0, 1.0, 1.0)), Part("box", (2.0, 1.0, 0.4), (1.0, 1.0, 1.0))
+ROUND = [(10 * np.cos(bearing), 10 * np.sin(bearing)) for bearing in np.linspace(0, 2 * np.pi, 101, endpoint=False)]
+NEARLY_IN_TOUCH = [(0, 0), (0, 5), (3.0, 5), (3.0, 1), (3.05, 0.89), (3.05, 5), (6, 5), (6, 0)]
 BAD_ROOMS = [
     ({"corners": [(0, 0), (4, 4), (4, 0), (0, 4)]}, "must not cross, got walls 0 and 2"),
     ({"corners": [(0, 0), (4, 0), (4, 4), (2, 0), (0, 4)]}, "must not cross, got walls 0 and 2"),
     ({"corners": [(0, 0), (4, 0), (2, 0)]}, "must not cross|floor of a room must be positive"),
-    ({"corners": [(0, 0), (4, 0), (4, 4), (2, 0.5), (0, 4)]}, r"right angle or blunter, got \(2.0, 0.5\)"),
+    (
+        {"corners": [(0, 0), (4, 0), (4, 4), (2, 0.5), (0, 4)]},
+        r"must not stand in the floor, got one from \(4.0, 4.0\)",
+    ),
+    ({"corners": NEARLY_IN_TOUCH}, r"0.1 m thick and must not stand in the floor, got one from \(3.05, 5.0\)"),
     ({"corners": [(0, 0), (1e300, 0), (0, 4)]}, "within 1e\\+09 m of the origin"),
+    ({"corners": [(0, 0), (1000, 0), (1000, 4), (0, 4)]}, "100 corners and be 200 m long at most, got 4 and 1000 m"),
+    ({"corners": ROUND}, "at most 100 corners and be 200 m long at most, got 101 and"),
+    ({"corners": SQUARE, "height": "2.4"}, "height of a room must be a finite number, got '2.4'"),
+    ({"corners": SQUARE, "height": True}, "height of a room must be a finite number, got True"),
+    ({"corners": SQUARE, "height": 10**400}, r"height of a room must be a finite number within 1e\+09, got 1000"),
+    ({"corners": SQUARE, "height": 21.0}, "height of a room must be in 0.1 to 20, got 21.0"),
+    ({"corners": [(0, 0), (4, "far"), (4, 4)]}, "corners of a room must be numbers in rows of one length, got .*'far'"),
+    ({"corners": [(0, 0), (4, 10**400), (4, 4)]}, "corners of a room must be numbers in rows of one length, got"),
+    ({"corners": SQUARE, "furniture": [SUNK]}, r"must stand in the room, got a box at \(2.0, 1.0\)"),
     ({"corners": [(0, 0), (4, 0)]}, "needs three corners or more, got 2"),
     ({"corners": [(0, 0), (4, 0), (4, 0.05), (0, 4)]}, r"at least 0.1 m long, got 0.050 m at corner 1"),
     ({"corners": [(0, 0), (4, 0), (np.nan, 4)]}, "corners of a room must be finite, got .*nan"),
     ({"corners": [(0, 0, 0), (4, 0, 0), (4, 4, 0)]}, r"shape \(N, 2\), got \(3, 3\)"),
-    ({"corners": SQUARE, "height": 0.0}, "height of a room must be positive and finite, got 0.0"),
+    ({"corners": SQUARE, "height": 0.0}, "height of a room must be in 0.1 to 20, got 0.0"),
     ({"corners": SQUARE, "furniture": [CABINET]}, r"must stand in the room, got a box at \(5.0, 1.0\)"),
 ]
 
@@ -120,7 +135,12 @@ BAD_PARTS = [
     ({"centre": (1.0, np.nan, 0.5)}, "centre must be finite, got nan"),
     ({"size": (1.0, 0.0, 1.0)}, "size must be positive and finite, got 0.0"),
     ({"shape": "cylinder", "size": (1.0, 2.0, 1.0)}, "as deep as wide"),
-    ({"turn": np.nan}, "turn must be finite, got nan"),
+    ({"turn": np.nan}, r"turn must be a finite number within 1e\+09, got nan"),
+    ({"turn": "0.4"}, "turn must be a finite number, got '0.4'"),
+    ({"turn": False}, "turn must be a finite number, got False"),
+    ({"turn": 10**400}, r"turn must be a finite number within 1e\+09, got 1000"),
+    ({"size": (1.0, "wide", 1.0)}, "size must be numbers in rows of one length, got .*'wide'"),
+    ({"centre": (1.0, 10**400, 0.5)}, "centre must be numbers in rows of one length, got"),
     ({"colour": (1.0, 1.0)}, r"colour must have shape \(3,\), got \(2,\)"),
 ]
 

@@ -1,5 +1,6 @@
 """The scanners without a laboratory: noise, steps, modes, missed readings and mixed pixels."""
 
+import re
 from dataclasses import fields, replace
 
 import numpy as np
@@ -93,14 +94,20 @@ def test_modes_that_the_sensor_lacks_are_refused(setting):
 
 
 BAD = [
-    ("fov", 361.0, "at most 360 degrees"),
+    ("fov", 361.0, "fov must be in 0.1 to 360, got 361.0"),
+    ("fov", 0.0, "fov must be in 0.1 to 360, got 0.0"),
     ("resolution", 0.7, "a multiple of resolution"),
-    ("rate", 0.0, "rate must be positive and finite, got 0.0"),
+    ("rate", 0.0, "rate must be in 0.1 to 1000, got 0.0"),
+    ("rate", 9.0, "rate of a SICK LMS 200 must be 10 in this mode, got 9"),
+    ("step", 0.3, "step must be a whole part of a metre, got 0.3"),
+    ("step", 2.0, "step must be in 0.0001 to 1, got 2.0"),
+    ("jump", 0.0, "jump must be in 0.001 to 1000, got 0.0"),
+    ("model", 200, "model must be a name, got 200"),
     ("min_range", 9.0, "min_range must be below max_range"),
-    ("noise", -0.001, "noise must be finite and not negative, got -0.001"),
-    ("bias", np.inf, "the bias finite, got .* inf"),
-    ("mixed", 1.5, "mixed must be a probability, got 1.5"),
-    ("missed", 1.01, "missed must be a probability, got 1.01"),
+    ("noise", -0.001, "noise must be in 0 to 1, got -0.001"),
+    ("bias", np.inf, r"bias must be a finite number within 1e\+09, got inf"),
+    ("mixed", 1.5, "mixed must be in 0 to 1, got 1.5"),
+    ("missed", 1.01, "missed must be in 0 to 1, got 1.01"),
 ]
 
 
@@ -111,11 +118,20 @@ def test_a_scanner_that_cannot_be_is_refused(name, value, rule):
         replace(CLEAN, **{name: value})
 
 
+@pytest.mark.parametrize("value", [np.nan, "1", True, None, [1.0], 10**400], ids=lambda value: f"{value!r:.5}")
 @pytest.mark.parametrize("name", [each.name for each in fields(Scanner) if each.name != "model"])
-def test_no_number_of_a_scanner_is_nan(name):
-    """NaN anywhere raises ValueError that tells of it."""
-    with pytest.raises(ValueError, match=r"got .*nan"):
-        replace(CLEAN, **{name: np.nan})
+def test_no_number_of_a_scanner_is_anything_else(name, value):
+    """NaN, text, a bool, nothing, a list and what no float holds raise ValueError that names field and value."""
+    with pytest.raises(ValueError, match=rf"^{name} must be a finite number.*, got \W?{re.escape(str(value)[:6])}"):
+        replace(CLEAN, **{name: value})
+
+
+def test_somebodys_own_scanner_counts_a_metre_in_whole_steps():
+    """A step of 1/3 m or 2.5 mm is one, of 0.3 m it is none, whatever the model."""
+    own = Scanner("my own", 90, 0.1, 12.5, 4.0, 0.1, 0.0025, 0.02)
+    assert replace(own, step=1 / 3).report(np.array([1.1]), np.random.default_rng(0))[0] in (2 / 3, 1.0, 4 / 3)
+    with pytest.raises(ValueError, match="step must be a whole part of a metre, got 0.3"):
+        replace(own, step=0.3)
 
 
 def test_mixed_pixels_fall_between_the_two_ranges_of_a_jump_and_nowhere_else():

@@ -107,9 +107,15 @@ BAD_OBJECTS = [
     ({"position": (np.nan, 3.0)}, "position must be finite, got nan"),
     ({"position": (1.0, 2.0, 3.0)}, r"position must have shape \(2,\), got \(3,\)"),
     ({"size": (0.0, 1.0)}, "size must be positive and finite, got 0.0"),
-    ({"height": -1.0}, "height must be positive and finite, got -1.0"),
-    ({"turn": np.nan}, "turn must be finite, got nan"),
-    ({"top": -0.1}, "top must be finite and not negative, got -0.1"),
+    ({"height": -1.0}, r"height must be in 0.001 to 1e\+06, got -1.0"),
+    ({"height": 21.0}, r"at most 20 m large, got \(1.0, 1.0\) and 21.0"),
+    ({"height": "1.0"}, "height must be a finite number, got '1.0'"),
+    ({"foot": True}, "foot must be a finite number, got True"),
+    ({"turn": 10**400}, r"turn must be a finite number within 1e\+09, got 1000"),
+    ({"position": ("left", 3.0)}, "position must be numbers in rows of one length, got .*'left'"),
+    ({"size": (10**400, 1.0)}, "size must be numbers in rows of one length, got"),
+    ({"turn": np.nan}, r"turn must be a finite number within 1e\+09, got nan"),
+    ({"top": -0.1}, "top must be in 0 to 100, got -0.1"),
     ({"shape": "cone", "size": (0.2, 0.3)}, r"a cone must be as deep as wide, got \(0.2, 0.3\)"),
 ]
 
@@ -125,12 +131,19 @@ BAD_ROBOTS = [
     ({"pose": (1.0, 1.0)}, r"the robot's pose must have shape \(3,\), got \(2,\)"),
     ({"pose": (1.0, np.nan, 0.0)}, "the robot's pose must be finite, got nan"),
     ({"way": [(1.0, np.inf)]}, "the robot's way must be finite, got .*inf"),
-    ({"speed": 0.0}, "the robot's speed must be positive and finite, got 0.0"),
-    ({"radius": np.nan}, "the robot's radius must be positive and finite, got nan"),
-    ({"laser_ahead": np.nan}, "laser_ahead must be finite, got nan"),
+    ({"speed": 0.0}, "the robot's speed must be in 0.01 to 2, got 0.0"),
+    ({"speed": "0.3"}, "the robot's speed must be a finite number, got '0.3'"),
+    ({"radius": True}, "the robot's radius must be a finite number, got True"),
+    ({"beam_height": 10**400}, r"the beam height must be a finite number within 1e\+09, got 1000"),
+    ({"laser_ahead": 0.26}, "laser_ahead must be in -0.25 to 0.25, got 0.26"),
+    ({"laser_ahead": -0.2, "radius": 0.1}, "laser_ahead must be in -0.1 to 0.1, got -0.2"),
+    ({"scanner": "SICK LMS 200"}, "the robot's scanner must be a Scanner, got 'SICK LMS 200'"),
+    ({"way": [(1.0, 10**400)]}, "the robot's way must be numbers in rows of one length, got"),
+    ({"radius": np.nan}, r"the robot's radius must be a finite number within 1e\+09, got nan"),
+    ({"laser_ahead": np.nan}, r"laser_ahead must be a finite number within 1e\+09, got nan"),
     ({"beam_height": 1.4}, "below shoulders, 1.4 m, got 1.4 m"),
     ({"beam_height": 0.0}, "over feet, .*, got 0.0 m"),
-    ({"beam_height": np.nan}, "over feet, .*, got nan m"),
+    ({"beam_height": np.nan}, r"the beam height must be a finite number within 1e\+09, got nan"),
 ]
 
 
@@ -142,6 +155,8 @@ def test_a_robot_that_cannot_be_is_refused(parts, rule):
 
 
 LOW = Room([(0, 0), (8, 0), (8, 6), (0, 6)], height=1.0)
+DIVIDED = Room(HALL.room.corners, [Part("box", (3.05, 1.5, 1.2), (0.1, 3.0, 2.4))])
+ACROSS = Robot((1.0, 1.0, 0.0), way=[(5.0, 1.0)])
 MOVED_FIRST = [Move(1, 0.0, (6.0, 3.0)), Move(0, 2.0, (4.0, 3.0))]
 BAD_SCENES = [
     ({"objects": [Object.cone((20.0, 20.0))]}, r"object 0 must stand in the room and free, got \(20.0, 20.0\)"),
@@ -150,8 +165,17 @@ BAD_SCENES = [
     ({"objects": [CAN, Object.cone((2.3, 3.0))]}, r"object 0 at \(2.0, 3.0\) and object 1 at \(2.3, 3.0\)"),
     ({"objects": [Object("box", (4.5, 1.0), (2, 2), 1)]}, r"the robot must not be in an object, got \(4.5, 0.6\)"),
     ({"robot": Robot((4.0, 0.1, 0.0))}, r"the robot must stand in the room and free, got \(4.0, 0.1\)"),
-    ({"robot": Robot(way=[(2.0, 3.1)])}, r"the robot's way must not be in an object, got \(2.0, 3.1\) and object 0"),
-    ({"robot": Robot(way=[(9.0, 3.0)])}, r"the robot's way must stand in the room and free, got \(9.0, 3.0\)"),
+    ({"robot": Robot(way=[(2.0, 3.1)])}, r"the robot's way must not be in an object, got \(2.35, 2.75\) and object 0"),
+    ({"robot": Robot(way=[(4.0, 5.0)])}, r"the robot's way must not be in an object, got \(4.26, 2.75\) and object 1"),
+    ({"robot": Robot(way=[(9.0, 3.0)])}, r"the robot's way must stand in the room and free, got \(7.76, 2.34\)"),
+    (
+        {"objects": [], "room": DIVIDED, "robot": ACROSS},
+        r"the robot's way must stand in the room .*, got \(2.76, 1.0\)",
+    ),
+    (
+        {"people": [Person([(2.1, 3.1), (6, 5)])]},
+        r"person 0 must not begin in an object, got \(2.1, 3.1\) and object 0",
+    ),
     ({"room": LOW, "robot": Robot(beam_height=1.1)}, r"below the top of the walls, 1.0 m, got 1.1 m"),
     ({"people": [Person([(1, 1), (9, 1)])]}, r"person 0 must walk in the room, got \(9.0, 1.0\)"),
     ({"people": [Person([(1, 1)]), Person([(7.5, 5.5)])]}, r"person 1 must walk in the room, got \(7.5, 5.5\)"),
@@ -162,6 +186,7 @@ BAD_SCENES = [
     ({"moves": [Move(2, 0.0, (6, 3))]}, "a move must be of one of 2 objects, got object 2"),
     ({"moves": [Move(-1, 0.0, (6, 3))]}, "a move must be of one of 2 objects, got object -1"),
     ({"moves": [Move(0.5, 0.0, (6, 3))]}, "a move must be of one of 2 objects, got object 0.5"),
+    ({"moves": [Move("1", 0.0, (6, 3))]}, "a move must be of one of 2 objects, got object 1"),
     ({"moves": [Move(0, 0.0, (9, 3))]}, r"object 0, when moved, must stand in the room and free, got \(9.0, 3.0\)"),
     ({"moves": [Move(0, 0.0, (7.5, 5.5))]}, r"object 0, when moved, must stand in the room and free"),
     ({"moves": [Move(0, 0.0, (4.2, 3.0))]}, r"not stand in anything, got \(4.2, 3.0\), in what is at \(4.0, 3.0\)"),
@@ -268,22 +293,77 @@ def test_what_is_no_number_is_refused(value):
             Scene.from_dict(with_part(content, path, value))
 
 
+TOLD = [  # where, what and how the field is called in the message
+    (("room", "height"), "the room: the height of a room"),
+    (("room", "furniture", 0, "turn"), r"furniture\[0\]: turn"),
+    (("robot", "speed"), "the robot: the robot's speed"),
+    (("robot", "scanner", "bias"), "the scanner: bias"),
+    (("objects", 1, "height"), r"objects\[1\]: height"),
+    (("people", 0, "scatter"), r"people\[0\]: scatter"),
+    (("people", 0, "stops", 0, 1), r"people\[0\]: the time of a stop"),
+    (("moves", 0, "seconds"), r"moves\[0\]: seconds"),
+]
+
+
+@pytest.mark.parametrize("value", ["1", True, 10**400], ids=["text", "true", "too large"])
+@pytest.mark.parametrize(("path", "name"), TOLD, ids=[name for _, name in TOLD])
+def test_text_true_and_what_no_float_holds_are_no_numbers_on_file(tmp_path, path, name, value):
+    """In a scene's file they raise FormatError that names the file, the field and the value."""
+    file = tmp_path / "room.json"
+    file.write_text(json.dumps(with_part(full_scene(), path, value)))
+    told = repr(value)[:40]
+    with pytest.raises(FormatError, match=f"room.json: {name} must be a finite number.*, got {told}"):
+        Scene.load(file)
+
+
+@pytest.mark.parametrize("value", ["1", True], ids=["text", "true"])
+def test_text_and_true_are_no_numbers_wherever_they_are(value):
+    """In coordinates, sizes, colours, times and places of stops as well, ValueError is raised."""
+    taken = []
+    for path in numbers(full_scene()):
+        try:
+            Scene.from_dict(with_part(full_scene(), path, value))
+        except ValueError:
+            continue
+        taken.append(path)
+    assert not taken
+
+
+def test_no_number_is_larger_than_a_float():
+    """Wherever in a scene 10**400 is put in place of a number, ValueError tells of it."""
+    content = full_scene()
+    for path in numbers(content):
+        with pytest.raises(ValueError, match="1000000"):
+            Scene.from_dict(with_part(content, path, 10**400))
+
+
+PLAIN_PERSON = full_scene()["people"][0]
 DAMAGED = [
     ({"format": "other scene"}, "not a scene: format must be 'dollop scene'"),
     ({"format": None}, "not a scene: format must be 'dollop scene'"),
     ({"version": 2}, "the version of a scene must be 1, got 2"),
     ({"version": None}, "the version of a scene must be 1, got None"),
     ({"version": "1"}, "the version of a scene must be 1, got '1'"),
-    ({"room": None}, "a damaged scene: KeyError 'room'"),
-    ({"robot": None}, "a damaged scene: KeyError 'robot'"),
-    ({"objects": None}, "a damaged scene: KeyError 'objects'"),
-    ({"people": None}, "a damaged scene: KeyError 'people'"),
-    ({"moves": None}, "a damaged scene: KeyError 'moves'"),
-    ({"ghosts": []}, "a scene has no ghosts"),
-    ({"objects": [{"shape": "box"}]}, "a damaged scene: TypeError .*'position', 'size', and 'height'"),
-    ({"objects": ["box"]}, "a damaged scene: "),
-    ({"people": [{"places": [[1, 1]], "age": 30}]}, "a damaged scene: TypeError .*'age'"),
-    ({"moves": [{"object": 0, "begin": 1.0}]}, "a damaged scene: TypeError .*'to'"),
+    ({"room": None}, "^a scene lacks room$"),
+    ({"robot": None}, "^a scene lacks robot$"),
+    ({"objects": None}, "^a scene lacks objects$"),
+    ({"people": None}, "^a scene lacks people$"),
+    ({"moves": None}, "^a scene lacks moves$"),
+    ({"ghosts": []}, "^a scene cannot have ghosts$"),
+    ({"objects": [{"shape": "box"}]}, r"^objects\[0\] lacks foot, height, position, size, top, turn$"),
+    ({"objects": ["box"]}, r"^objects\[0\] must have foot, height, position, shape, size, top, turn, got str$"),
+    ({"objects": {}}, "^objects must be a list, got dict$"),
+    ({"robot": []}, "^the robot must have beam_height, .*, got list$"),
+    (
+        {"people": [{"places": [[1, 1]], "age": 30}]},
+        r"^people\[0\] lacks back, begin, body, laps, scatter, seed, .*, times$",
+    ),
+    ({"people": [PLAIN_PERSON | {"age": 30}]}, r"^people\[0\] cannot have age$"),
+    (
+        {"people": [PLAIN_PERSON | {"body": "robot"}]},
+        r"^people\[0\]: body must be one of 'torso', 'legs', got 'robot'$",
+    ),
+    ({"moves": [{"object": 0, "begin": 1.0}]}, r"^moves\[0\] lacks seconds, to$"),
 ]
 
 
@@ -311,8 +391,9 @@ BAD_SCANNERS = [
     ({"max_range": 8.191}, "max_range of a SICK LMS 200 must be 81.91 in this mode, got 8.191"),
     ({"min_range": 0.1}, "min_range of a SICK LMS 200 must be 0.2 in this mode, got 0.1"),
     ({"model": "SICK TiM571"}, "fov of a SICK TiM571 must be 270 in this mode, got 100"),
-    ({"missed": 2.0}, "missed must be a probability, got 2"),
-    ({"colour": "blue"}, "a damaged scene: TypeError .*'colour'"),
+    ({"missed": 2.0}, "^the scanner: missed must be in 0 to 1, got 2.0$"),
+    ({"step": 0.3}, "^the scanner: step must be a whole part of a metre, got 0.3$"),
+    ({"colour": "blue"}, "^the scanner cannot have colour$"),
 ]
 
 

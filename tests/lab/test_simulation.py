@@ -9,12 +9,13 @@ from scipy.spatial import cKDTree
 
 pytest.importorskip("pybullet", reason="the laboratory needs PyBullet (extra `lab`)")
 
+from dollop.lab.driving import ARRIVED
 from dollop.lab.engine import Engine, Solid
 from dollop.lab.outlines import outline_distances
 from dollop.lab.person import DEPTH, SHOULDERS, Walk, figure_eight
 from dollop.lab.pioneer import Pioneer
 from dollop.lab.recording import Recording
-from dollop.lab.rooms import LABORATORY
+from dollop.lab.rooms import LABORATORY, Room
 from dollop.lab.scanner import SickLMS200, SickTiM571
 from dollop.lab.scenes import Move, Object, Person, Robot, Scene, empty_scene, figure_eight_scene
 from dollop.lab.simulate import record, record_background, record_figure_eights, record_tour, watch
@@ -198,8 +199,13 @@ def test_a_recording_is_as_its_scanner_scans(scanner):
 
 def test_nobody_and_no_duration_is_no_recording():
     """A scene in which nobody walks needs a duration; watched, its truth has no rows."""
-    with pytest.raises(ValueError, match="needs a person who walks, or a duration, got neither"):
+    with pytest.raises(ValueError, match="needs a first person who walks, or a duration, got neither"):
         record(empty_scene(), 0)
+    with pytest.raises(ValueError, match="needs a first person who walks, or a duration, got neither"):
+        record(Scene(people=[Person([(3.0, 3.0)]), Person([(2.0, 5.0), (6.0, 5.0)])]), 0)
+    for duration, rule in [("5", "finite number, got '5'"), (1e6, "in 0 to 86400, got 1000000.0"), (-1.0, "in 0 to")]:
+        with pytest.raises(ValueError, match=f"duration must be .*{rule}"):
+            watch(empty_scene(), 0, duration)
     recording = watch(empty_scene(), 0, duration=0.5)
     assert len(recording.log) == 5 and recording.truth.empty
 
@@ -298,7 +304,7 @@ def test_the_background_drive_sees_what_the_watching_robot_sees():
 def test_a_tour_looks_all_round_at_every_place():
     """It scans in straight lines from place to place, turns once round at each, and its beams end on the record."""
     places = np.array([(3.0, 3.0), (6.0, 3.0), (6.0, 4.5)])
-    scene = Scene(robot=Robot(scanner=replace(CLEAN, max_range=20.0)))
+    scene = Scene(robot=Robot(scanner=replace(CLEAN, model="my own", max_range=20.0)))
     log = record_tour(scene, places, 0, stride=0.2, turns=8)
     there = np.abs(log.poses[:, None, :2] - places).max(axis=2) < 1e-9
     assert there.sum(axis=0).tolist() == [8, 8, 8] and len(log) == 3 * 8 + 14 + 7
@@ -312,7 +318,65 @@ def test_a_tour_looks_all_round_at_every_place():
         assert np.abs(outline_distances(ends, scene.section)).min(axis=1).max() < 0.002
 
 
+BAD_TOURS = [
+    ({"places": [(3.0, 3.0), (3.0, 7.5)]}, r"must be in the room and free, got \[\[3.0, 3.0\], \[3.0, 7.5\]\]"),
+    ({"places": [(3.0, 3.0), (8.8, 5.95)]}, "must be in the room and free"),
+    ({"places": []}, "places must have shape|must be in the room and free"),
+    ({"places": [(3.0, np.nan)]}, r"places must be finite, got \[3.0, nan\] in row 0"),
+    ({"stride": 0.0}, "stride must be in 0.01 to inf, got 0.0"),
+    ({"stride": "1"}, "stride must be a finite number, got '1'"),
+    ({"turns": 0}, "turns must be in 1 to inf, got 0"),
+]
+
+
+@pytest.mark.parametrize(("said", "rule"), BAD_TOURS)
+def test_a_tour_that_cannot_be_is_refused(said, rule):
+    """A place outside the room or in furniture, none at all, and a number out of its range raise ValueError."""
+    with pytest.raises(ValueError, match=rule):
+        record_tour(**({"scene": empty_scene(), "places": [(3.0, 3.0), (6.0, 3.0)], "seed": 0} | said))
+
+
+HALL = Scene(room=Room([(0, 0), (4, 0), (4, 3), (0, 3)]), robot=Robot((1.0, 1.0, 0.0)))
+
+
+def test_another_room_needs_a_tour_of_its_own():
+    """Without one ValueError says so; with one the robot drives to its places, and there are walls all round."""
+    with pytest.raises(ValueError, match="another room needs a tour of its own, got none"):
+        record_background(0, scene=HALL)
+    log = record_background(0, SickLMS200(mode="cm", noise=0.0, mixed=0.0), HALL, [(2.5, 1.0), (2.5, 2.0)])
+    nearest = np.linalg.norm(log.poses[:, None, :2] - [(2.5, 1.0), (2.5, 2.0)], axis=2).min(axis=0)
+    assert nearest.max() < ARRIVED + 0.05 and np.isfinite(log.ranges).all()
+
+
+@pytest.mark.parametrize("goal", [(9.0, 1.0), (2.0, -0.5)])
+def test_a_tour_to_a_place_that_is_not_reached_ends(monkeypatch, goal):
+    """A place behind a wall raises ValueError that names it, when the robot has had time enough."""
+    monkeypatch.setattr("dollop.lab.simulate.PATIENCE", 2.0)
+    with pytest.raises(ValueError, match=rf"must be free .*, got \[{goal[0]}, {goal[1]}\], not reached within 2 s"):
+        record_background(0, scene=HALL, tour=[goal])
+
+
+def test_a_tour_of_no_places_is_refused():
+    """Numbers that are none, and places of three coordinates, raise ValueError that names the tour."""
+    for tour, rule in [([(1.0, np.nan)], "tour must be finite"), ([(1.0, 1.0, 0.0)], r"tour must have shape \(N, 2\)")]:
+        with pytest.raises(ValueError, match=rule):
+            record_background(0, scene=HALL, tour=tour)
+
+
 # ---- pictures
+
+
+BAD_PIXELS = [(0, "in 1 to 10000, got 0"), (-10, "in 1 to 10000, got -10"), ("90", "a finite number, got '90'")]
+
+
+@pytest.mark.parametrize(("pixels", "rule"), BAD_PIXELS)
+@pytest.mark.parametrize("name", ["width", "height"])
+def test_a_picture_has_pixels(name, pixels, rule):
+    """None, fewer than none and text for a number of pixels raise ValueError that names which."""
+    from dollop.lab.render import render_lab
+
+    with pytest.raises(ValueError, match=f"{name} must be {rule}"):
+        render_lab(**({"width": 120, "height": 90} | {name: pixels}))
 
 
 def test_pictures_show_a_red_robot_and_come_out_the_same():
