@@ -102,8 +102,9 @@ def checked_array(name, values, *shape, finite=True):
     """
     try:
         array = np.array(values, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} must be numbers in rows of one length, got {values!r:.60}") from None
+    except (TypeError, ValueError, OverflowError) as error:
+        rule = f"{name} must be numbers in rows of one length"
+        raise ValueError(f"{rule}, got {values!r:.60} ({error!s:.80})") from None
     sizes = zip(shape, array.shape, strict=False)
     if array.ndim != len(shape) or any(n != m for n, m in sizes if not isinstance(n, str)):
         wanted = f"({shape[0]},)" if len(shape) == 1 else f"({', '.join(map(str, shape))})"
