@@ -7,7 +7,8 @@ import numpy as np
 
 from dollop.lab.rooms import Part, Room
 from dollop.lab.scanner import UTM30LX, SickLMS200, SickTiM571
-from dollop.lab.scenes import Move, Object, Person, Robot, Scene
+from dollop.lab.scenes import Scene
+from dollop.lab.things import Move, Object, Person, Robot
 
 SCANNERS = [SickLMS200(), SickLMS200(100, 0.25, "cm", bias=-0.01), SickTiM571(missed=0.02), UTM30LX(0.03)]
 

@@ -28,11 +28,9 @@ HOMES = {
     "render": ["render_lab", "render_robot"],
     "rooms": ["LABORATORY", "Part", "Room"],
     "scanner": ["Scanner", "SickLMS200", "SickTiM571", "UTM30LX"],
-    "scenes": [
-        "Move", "Object", "Person", "Robot", "Scene", "empty_scene", "figure_eight_scene", "moved", "rearranged",
-        "slalom_scene",
-    ],
+    "scenes": ["Scene", "empty_scene", "figure_eight_scene", "moved", "rearranged", "slalom_scene"],
     "simulate": ["record", "record_background", "record_figure_eights", "record_tour", "watch"],
+    "things": ["Move", "Object", "Person", "Robot"],
     "world": ["World"],
 }  # fmt: skip
 MODULES = {name: module for module, names in HOMES.items() for name in names}

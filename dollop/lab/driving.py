@@ -51,7 +51,7 @@ def planned_poses(robot, t):
 
     Examples
     --------
-    >>> from dollop.lab.scenes import Robot
+    >>> from dollop.lab.things import Robot
     >>> planned_poses(Robot((0.0, 0.0, 0.0), way=[(1.3, 0.0)], speed=0.5), [0.0, 1.0, 9.0]).round(2).tolist()
     [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [1.0, 0.0, 0.0]]
     """

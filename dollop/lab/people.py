@@ -15,7 +15,7 @@ from dollop.formats.files import FormatError
 from dollop.lab.driving import planned_poses
 from dollop.lab.outlines import outline_distances
 from dollop.lab.person import DEPTH, SHOULDERS, TIME_STEP, Walk, check_room, walk, walk_along
-from dollop.lab.scenes import Person
+from dollop.lab.things import Person
 from dollop.pose import rotation
 from dollop.trajectory import arc_length
 
@@ -54,7 +54,8 @@ def walk_of(person, scene):
     --------
     A stop takes the time that it is said to take.
 
-    >>> from dollop.lab.scenes import Person, empty_scene
+    >>> from dollop.lab.scenes import empty_scene
+    >>> from dollop.lab.things import Person
     >>> straight = [(2.0, 3.0), (4.0, 3.0), (6.0, 3.0)]
     >>> going, stopping = Person(straight), Person(straight, stops=[(1, 4.0)])
     >>> longer = walk_of(stopping, empty_scene()).t[-1] - walk_of(going, empty_scene()).t[-1]
@@ -188,7 +189,8 @@ def find_way(scene, places, clear=0.15):
     Through the door of a wall between two rooms.
 
     >>> from dollop.lab.rooms import Part, Room
-    >>> from dollop.lab.scenes import Robot, Scene
+    >>> from dollop.lab.scenes import Scene
+    >>> from dollop.lab.things import Robot
     >>> wall = Part("box", (3.0, 1.5, 1.2), (0.1, 3.0, 2.4))
     >>> rooms = Scene(room=Room([(0, 0), (6, 0), (6, 4), (0, 4)], [wall]), robot=Robot((1.0, 3.4, 0.0)))
     >>> find_way(rooms, [(1.0, 1.0), (5.0, 1.0)])[1:-1, 1].min() > 3.0

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from dollop.lab.driving import ARRIVED, planned_poses, pursue
-from dollop.lab.scenes import Person, Robot, Scene
+from dollop.lab.scenes import Scene
+from dollop.lab.things import Person, Robot
 
 WAY = [(4.5, 2.2), (5.6, 3.2)]
 

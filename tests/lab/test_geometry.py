@@ -12,7 +12,8 @@ from random_scenes import random_scene
 from dollop.lab.people import walks_of
 from dollop.lab.person import DEPTH, LEG_RADIUS, SHOULDERS, Walk
 from dollop.lab.rooms import Part, Room
-from dollop.lab.scenes import Move, Object, Person, Robot, Scene
+from dollop.lab.scenes import Scene
+from dollop.lab.things import Move, Object, Person, Robot
 from dollop.lab.world import World
 
 SCENES, BLOCKS = 200, 8

@@ -14,7 +14,8 @@ from dollop.lab.outlines import outline_distances
 from dollop.lab.people import find_way, read_walks, replay, walk_of, walks_of
 from dollop.lab.person import SHOULDERS
 from dollop.lab.rooms import Part, Room
-from dollop.lab.scenes import Move, Object, Person, Robot, Scene
+from dollop.lab.scenes import Scene
+from dollop.lab.things import Move, Object, Person, Robot
 from dollop.trajectory import arc_length
 
 HALL = Scene(room=Room([(0, 0), (24, 0), (24, 8), (0, 8)]), robot=Robot((1.0, 0.5, 0.0)))

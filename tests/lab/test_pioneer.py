@@ -13,7 +13,8 @@ from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.lab.pioneer import Pioneer
 from dollop.lab.rooms import LABORATORY
-from dollop.lab.scenes import BEAM_HEIGHT, empty_scene, figure_eight_scene
+from dollop.lab.scenes import empty_scene, figure_eight_scene
+from dollop.lab.things import BEAM_HEIGHT
 from dollop.lab.world import World
 from dollop.pose import moved_pose
 from dollop.robot.control import PIONEER_LIMITS

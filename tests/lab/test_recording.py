@@ -9,7 +9,8 @@ import pytest
 
 from dollop.formats.files import FormatError
 from dollop.lab.recording import MOVED_COLUMNS, ROBOT_COLUMNS, TRUTH_COLUMNS, Recording
-from dollop.lab.scenes import Move, Person, Robot, figure_eight_scene
+from dollop.lab.scenes import figure_eight_scene
+from dollop.lab.things import Move, Person, Robot
 from dollop.laser import LaserLog
 
 

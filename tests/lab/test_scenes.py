@@ -12,20 +12,8 @@ from dollop.formats.files import FormatError
 from dollop.lab.outlines import outline_distances
 from dollop.lab.rooms import LABORATORY, Part, Room
 from dollop.lab.scanner import Scanner, SickLMS200
-from dollop.lab.scenes import (
-    BEAM_HEIGHT,
-    Move,
-    Object,
-    Person,
-    Robot,
-    Scene,
-    empty_scene,
-    figure_eight_scene,
-    moved,
-    object_gaps,
-    rearranged,
-    slalom_scene,
-)
+from dollop.lab.scenes import Scene, empty_scene, figure_eight_scene, moved, object_gaps, rearranged, slalom_scene
+from dollop.lab.things import BEAM_HEIGHT, Move, Object, Person, Robot
 
 SEEDS = range(12)
 HALL = Scene(room=Room([(0, 0), (8, 0), (8, 6), (0, 6)], [Part("box", (7.5, 5.5, 0.5), (0.8, 0.8, 1.0))]))

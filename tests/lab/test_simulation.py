@@ -17,8 +17,9 @@ from dollop.lab.pioneer import Pioneer
 from dollop.lab.recording import Recording
 from dollop.lab.rooms import LABORATORY, Room
 from dollop.lab.scanner import SickLMS200, SickTiM571
-from dollop.lab.scenes import Move, Object, Person, Robot, Scene, empty_scene, figure_eight_scene
+from dollop.lab.scenes import Scene, empty_scene, figure_eight_scene
 from dollop.lab.simulate import record, record_background, record_figure_eights, record_tour, watch
+from dollop.lab.things import Move, Object, Person, Robot
 from dollop.lab.world import World
 
 CLEAN = SickLMS200(noise=0.0, mixed=0.0)

@@ -14,7 +14,8 @@ from dollop.cli import main
 from dollop.environment import Environment
 from dollop.formats.files import FormatError
 from dollop.lab.people import walk_of, walks_of
-from dollop.lab.scenes import Object, Person, Scene
+from dollop.lab.scenes import Scene
+from dollop.lab.things import Object, Person
 from dollop.replication.worlds import chain, survey
 from dollop.replication.worlds.chain import Judgement, judge, judge_objects, judge_user, side
 from dollop.replication.worlds.draw import FAIR, KINDS, draw

@@ -43,7 +43,8 @@ from dollop.lab.outlines import meeting
 from dollop.lab.people import find_way, free_places, walk_of, walks_of
 from dollop.lab.person import SHOULDERS
 from dollop.lab.scanner import UTM30LX, SickLMS200, SickTiM571
-from dollop.lab.scenes import Move, Object, Person, Robot, Scene
+from dollop.lab.scenes import Scene
+from dollop.lab.things import Move, Object, Person, Robot
 from dollop.pose import wrapped
 from dollop.replication.worlds.rooms import NoRoom, anew, draw_room, somewhere
 from dollop.replication.worlds.view import in_view, objects_in_view
