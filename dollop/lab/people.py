@@ -72,8 +72,8 @@ def walk_of(person, scene):
         check_room(moving.positions, scene)
         return standing_before(moving, person.begin)
     rng = np.random.default_rng(person.seed)
-    points, numbers = closely(places[visits(places, person.laps, person.back)])
     visited = np.array(visits(places, person.laps, person.back))
+    points, numbers = closely(places[visited])
     points = points + rng.normal(0.0, person.scatter, points.shape) * (person.scatter > 0)
     stops = [(int(numbers[i]), seconds) for k, seconds in person.stops for i in np.flatnonzero(visited == k)]
     gait = {"speed": person.speed, "stand": (person.begin, AFTERWARDS), "body": person.body, "stops": stops}

@@ -490,9 +490,10 @@ def check_room(positions, scene, from_background=0.0):
     room = scene.room.distance(positions) - SHOULDERS / 2
     nearest = np.argmin(room)
     if room[nearest] < from_background:
-        rule = f"{from_background} m between shoulder and background"
+        rule = "a walk must not lead through wall or furniture, and must keep"
         place = np.round(positions[nearest], 2).tolist()
-        raise ValueError(f"a walk must keep {rule}, got {room[nearest]:.2f} m at {place}")
+        told = f"got {room[nearest]:.2f} m at {place}"
+        raise ValueError(f"{rule} {from_background} m between shoulder and background, {told}")
     if scene.objects:
         gaps = outline_distances(positions, [each.footprint for each in scene.objects])
         when, which = np.unravel_index(gaps.argmin(), gaps.shape)
