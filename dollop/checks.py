@@ -1,15 +1,22 @@
-"""What is asked of numbers and arrays from outside; errors name the value and the rule."""
+"""What is asked of input, and what is said of results: errors and notes name the value and the rule."""
+
+from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 
 __all__ = [
+    "EXTRAS",
+    "Note",
     "check_choice",
     "check_positive",
     "checked_array",
     "checked_number",
     "checked_numbers",
     "checked_positions",
+    "need",
     "put_in",
+    "trusted",
 ]
 
 FARTHEST = 1e9
@@ -218,3 +225,77 @@ def put_in(record, **fields):
         if isinstance(value, np.ndarray):
             value.flags.writeable = False
         object.__setattr__(record, name, value)
+
+
+EXTRAS = {"lab": "pybullet", "ros": "rosbags", "baseline": "hmmlearn", "cluster": "distributed"}
+"""The module by which each extra of pyproject.toml that the code asks for is known to be there."""
+
+
+def need(extra):
+    """Refuse to begin where an extra is missing, with the line that installs it.
+
+    Parameters
+    ----------
+    extra : str
+        A key of `EXTRAS`.
+
+    Raises
+    ------
+    ImportError
+        If it is not installed.
+    ValueError
+        If there is no such extra.
+
+    Examples
+    --------
+    >>> need("laboratory")
+    Traceback (most recent call last):
+    ValueError: extra must be one of 'lab', 'ros', 'baseline', 'cluster', got 'laboratory'
+    """
+    check_choice("extra", extra, EXTRAS)
+    if find_spec(EXTRAS[extra]) is None:
+        wheels = " (wheels only for Linux x86-64 and CPython up to 3.11)" if extra == "lab" else ""
+        raise ImportError(f'this needs {EXTRAS[extra]}: pip install "dollop[{extra}]"{wheels}')
+
+
+@dataclass(frozen=True)
+class Note:
+    """What somebody who uses a result must know of it (beyond the paper).
+
+    On good input there are none.
+
+    Attributes
+    ----------
+    kind : str
+        One word or two for programs: what is noted.
+    text : str
+        One sentence for people, with the number that was found and the rule that it breaks.
+    doubt : bool
+        Whether it puts the result in doubt; otherwise it is only good to know.
+    """
+
+    kind: str
+    text: str
+    doubt: bool = True
+
+    def __str__(self):
+        return f"{self.kind}: {self.text}"
+
+
+def trusted(notes):
+    """Whether no note puts the result in doubt.
+
+    Parameters
+    ----------
+    notes : iterable of Note
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> trusted([Note("sensor", "180 beams are taken to be 1 degree apart", doubt=False)])
+    True
+    """
+    return not any(note.doubt for note in notes)

@@ -28,6 +28,8 @@ class LaserLog:
         Sensor in the world: x, y in m, theta in rad, wrapped to (-pi, pi].
     max_range : float
         The farthest range the sensor can report, in m.
+    notes : tuple of Note
+        What a reader had to guess, or found wrong and could not mend.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class LaserLog:
     angles: np.ndarray
     poses: np.ndarray
     max_range: float
+    notes: tuple = ()
 
     def __post_init__(self):
         t, angles = checked_array("t", self.t, "T"), checked_array("angles", self.angles, "B")

@@ -106,7 +106,7 @@ def test_an_interrupt_ends_with_one_line(monkeypatch, capsys):
 def test_a_missing_extra_is_named_before_the_work(command, monkeypatch, tmp_path):
     """Without PyBullet the replication says at once how to install it, and writes nothing."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("dollop.extras.find_spec", lambda name: None)
+    monkeypatch.setattr("dollop.checks.find_spec", lambda name: None)
     with pytest.raises(SystemExit, match=r'^dollop: .*pip install "dollop\[lab\]"'):
         main(command)
     assert list(tmp_path.iterdir()) == []

@@ -6,7 +6,7 @@ import tomllib
 import pytest
 from places import ROOT
 
-from dollop.extras import EXTRAS, need
+from dollop.checks import EXTRAS, need
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dollop.extras import need
+from dollop.checks import need
 from dollop.formats.files import FormatError, from_file, warn_of
 from dollop.formats.scans import Beams, Scan, usable_scans
 from dollop.laser import LaserLog

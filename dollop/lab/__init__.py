@@ -16,7 +16,7 @@ when it is missing. A module is imported when one of its names is first asked fo
 
 from importlib import import_module
 
-from dollop.extras import need
+from dollop.checks import need
 
 HOMES = {
     "drawn": ["TASKS", "draw_demonstrations", "random_layouts"],

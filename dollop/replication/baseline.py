@@ -17,7 +17,7 @@ import pandas as pd
 from tqdm import tqdm
 
 from dollop.cdhmm import SubgoalHMM
-from dollop.extras import need
+from dollop.checks import need
 from dollop.lab.drawn import TASKS, draw_demonstrations
 
 __all__ = [

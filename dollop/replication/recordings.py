@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from dollop import lab
+from dollop.checks import need
 from dollop.environment import corner_indices
-from dollop.extras import need
 from dollop.formats.files import check_writable
 from dollop.formats.logs import write_log
 from dollop.gridmap import OccupancyGrid

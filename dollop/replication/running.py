@@ -8,7 +8,7 @@ from functools import partial
 import joblib
 from tqdm import tqdm
 
-from dollop.extras import need
+from dollop.checks import need
 
 __all__ = ["as_json", "going_on_in", "put_between_marks", "report_beside", "run_all"]
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from dollop.extras import need
+from dollop.checks import need
 from dollop.formats.files import FormatError, check_writable, whole_file
 from dollop.replication.claims import CLAIMS
 from dollop.replication.claims.observing import choose_noises

@@ -9,7 +9,7 @@ from places import ROOT
 
 import dollop
 from dollop import figures as door
-from dollop.extras import EXTRAS
+from dollop.checks import EXTRAS
 from dollop.replication import baseline, figures, recordings
 from dollop.replication.figures.controls import CONTROLS, numbers
 from dollop.replication.figures.performing import law_numbers
@@ -148,7 +148,7 @@ def test_unknown_figures_are_named_with_the_known_ones(capsys):
 @pytest.mark.parametrize("extra", ["lab", "baseline"])
 def test_without_an_extra_the_figures_say_how_to_get_it(extra, tmp_path, monkeypatch):
     """The error names the extra that any of the figures lacks, before the first is drawn."""
-    monkeypatch.setattr("dollop.extras.find_spec", lambda name: None if name == EXTRAS[extra] else "found")
+    monkeypatch.setattr("dollop.checks.find_spec", lambda name: None if name == EXTRAS[extra] else "found")
     with pytest.raises(ImportError, match=rf"pip install .dollop\[{extra}\]"):
         figures.main(["2", "x2", "--folder", str(tmp_path)])
     assert list(tmp_path.iterdir()) == []

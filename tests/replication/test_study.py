@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dollop.checks import EXTRAS
 from dollop.cli import main
-from dollop.extras import EXTRAS
 from dollop.formats.files import FormatError
 from dollop.replication import running, study
 from dollop.replication.claims import (

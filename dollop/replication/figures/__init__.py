@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 from tqdm import tqdm
 
 from dollop import plot
-from dollop.extras import need
+from dollop.checks import need
 from dollop.formats.files import FormatError, check_writable, whole_file
 from dollop.replication import gallery
 from dollop.replication.figures import environment, learning, observing, performing  # noqa: F401

@@ -28,7 +28,7 @@ class Panel:
     look : str
         What to look at, and what to make of it: the rest of the docstring.
     extra : str
-        What must be installed to draw it: a key of `dollop.extras.EXTRAS`.
+        What must be installed to draw it: a key of `dollop.checks.EXTRAS`.
     """
 
     id: str
