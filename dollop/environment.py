@@ -17,15 +17,67 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from dollop.checks import checked_array
+from dollop.checks import checked_array, put_in
+from dollop.gridmap import flat_cells
 
-__all__ = ["Environment", "corner_indices", "integer_costs", "spring_constants", "spring_forces"]
+__all__ = [
+    "Environment",
+    "Seen",
+    "corner_indices",
+    "integer_costs",
+    "spring_constants",
+    "spring_forces",
+    "standing_boxes",
+]
 
 # A corner's place in its box: 0 lower left, then counter-clockwise. The columns are those of a box.
 _CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
 # The ceiling would make 1 of a rounding error of 1e-13: changes of force below this many units
 # count as none.
 _ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The part of the floor that the laser has seen (beyond the paper).
+
+    Attributes
+    ----------
+    floor : (H, W) bool array
+        Where a beam has passed or ended; indexed [row, col] = [y, x].
+    origin : (float, float)
+        Lower left corner, x, y in m.
+    resolution : float
+        Side of a cell in m.
+    """
+
+    floor: np.ndarray
+    origin: tuple
+    resolution: float
+
+    def at(self, points):
+        """Whether an object that stood there would have been found.
+
+        Parameters
+        ----------
+        points : (M, 2) array_like
+            In m.
+
+        Returns
+        -------
+        (M,) bool array
+            False off the map.
+
+        Examples
+        --------
+        >>> Seen(np.array([[True, False]]), (0.0, 0.0), 1.0).at([[0.5, 0.5], [1.5, 0.5], [9.0, 9.0]]).tolist()
+        [True, False, False]
+        """
+        points = np.asarray(points, dtype=float).reshape(-1, 2)
+        cells, inside = flat_cells(points, self.origin, self.resolution, self.floor.shape)
+        found = np.zeros(len(points), bool)
+        found[inside] = self.floor.ravel()[cells]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +89,11 @@ class Environment:
     boxes : (N, 4) array
         xmin, ymin, xmax, ymax of each object in m. N may be 0: a lab with nothing in it is a fact
         to record, although nothing can be matched with it or associated with it.
+    seen : Seen, optional
+        Where an object would have been found; unknown when not given.
+    assumed : (N, 4) bool array, optional
+        Which sides of each box, in the order of its numbers, no beam has reached: they are where
+        they would be if the object were as deep as it is wide. None when not given.
 
     Raises
     ------
@@ -52,6 +109,8 @@ class Environment:
     """
 
     boxes: np.ndarray
+    seen: Seen = None
+    assumed: np.ndarray = None
 
     def __post_init__(self):
         boxes = checked_array("boxes", self.boxes if np.size(self.boxes) else np.empty((0, 4)), "N", 4)
@@ -59,8 +118,10 @@ class Environment:
         if len(negative):
             found = f"{boxes[negative[0]].tolist()} for object {negative[0]}"
             raise ValueError(f"a box must have xmin <= xmax and ymin <= ymax, got {found}")
-        boxes.flags.writeable = False
-        object.__setattr__(self, "boxes", boxes)
+        assumed = np.zeros(boxes.shape, bool) if self.assumed is None else np.array(self.assumed, bool)
+        if assumed.shape != boxes.shape:
+            raise ValueError(f"assumed must hold four sides for each box, got shape {assumed.shape} for {len(boxes)}")
+        put_in(self, boxes=boxes, assumed=assumed)
 
     def __len__(self):
         return len(self.boxes)
@@ -215,3 +276,179 @@ def _springs(corners):
         first, second = np.argwhere(squares == 0)[0]
         raise ValueError(f"corners {first} and {second} must not coincide: infinite spring")
     return 1 / squares, differences
+
+
+# ---- boxes of what stands
+
+LINK, SPACINGS = 0.15, 2.2
+"""Cells are of one surface where they are nearer than `LINK` m or than so many beam spacings."""
+FLAT = 0.10
+"""m: a box seen no deeper than this shows one face only."""
+ROUND = 0.22
+"""Share of its extent by which the near corner of a box is empty where what stands there is round."""
+SHADOW, ONE_OBJECT = 0.45, 1.3
+"""m: two surfaces so near are one where something hides all that is between, and make no larger box."""
+UNSURE = 0.20
+"""m between beams on a grazed face, from which on its end is not known."""
+
+
+def standing_boxes(places, sensors, step, scan=None, min_area=0.01):
+    """Boxes round what stands, from the readings on its near faces (Sec. IV; a reconstruction).
+
+    Neighbouring cells are one surface; surfaces whose completed boxes overlap are one object, and
+    so are those between which all is in the shadow of something nearer. Where a face along an axis
+    was seen, its two ends are sides of the box; where none was, the object is taken to be as deep
+    as it is wide, and its far side is assumed.
+
+    Parameters
+    ----------
+    places, sensors : (M, 2) float arrays
+        Mean reading in each cell, and where it was seen from, in m.
+    step : float
+        Angle between beams in rad.
+    scan : (pose (3,), angles (B,), ranges (B,)), optional
+        The last one, which tells what hides what.
+    min_area : float
+        Smallest box in m^2 (Sec. II: 100 square centimetres).
+
+    Returns
+    -------
+    boxes : (N, 4) float array
+        xmin, ymin, xmax, ymax in m.
+    assumed : (N, 4) bool array
+        Sides that no beam has reached.
+    hidden : (N,) bool array
+        Which of them something nearer, or the edge of the field of view, may hide in part.
+    groups : list of N int arrays
+        Rows of `places` in each box.
+
+    Examples
+    --------
+    A wall of a box, seen from the front: as deep as wide, and that is assumed.
+
+    >>> face = np.column_stack([np.linspace(0, 0.4, 9), np.zeros(9)])
+    >>> boxes, assumed, *_ = standing_boxes(face, np.tile([0.2, -2.0], (9, 1)), 0.001)
+    >>> boxes.round(2).tolist(), assumed.tolist()
+    ([[0.0, 0.0, 0.4, 0.4]], [[False, False, False, True]])
+    """
+    groups = surfaces(places, sensors, step)
+    boxes = [box_round(places[rows], sensors[rows], step) for rows in groups]
+    while (pair := one_object(boxes, groups, places, scan)) is not None:
+        i, j = pair
+        groups[i] = np.concatenate([groups[i], groups.pop(j)])
+        boxes.pop(j)
+        boxes[i] = box_round(places[groups[i]], sensors[groups[i]], step)
+    large = [k for k, (box, _) in enumerate(boxes) if np.prod(box[2:] - box[:2]) >= min_area and len(groups[k]) > 1]
+    ends = [hidden_ends(places[groups[k]], scan) for k in large]
+    kept = np.array([boxes[k][0] for k in large]).reshape(-1, 4)
+    assumed = np.array([boxes[k][1] for k in large], bool).reshape(-1, 4)
+    return kept, assumed, np.array([any(each) for each in ends], bool), [groups[k] for k in large]
+
+
+def surfaces(places, sensors, step):
+    """Rows (M,) of neighbouring places (M, 2), a list of int arrays."""
+    if not len(places):
+        return []
+    link = np.maximum(LINK, SPACINGS * step * np.linalg.norm(places - sensors, axis=1))
+    pairs = scipy.spatial.cKDTree(places).query_pairs(link.max(), output_type="ndarray")
+    apart = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
+    i, j = pairs[apart <= np.minimum(link[pairs[:, 0]], link[pairs[:, 1]])].T
+    graph = scipy.sparse.coo_matrix((np.ones(len(i)), (i, j)), (len(places),) * 2)
+    count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    return [np.flatnonzero(label == k) for k in range(count)]
+
+
+def box_round(places, sensors, step):
+    """Box (4,) round what was seen at places (M, 2) from sensors (M, 2), and its assumed sides (4,)."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    sight = places - sensors
+    spacing = step * np.linalg.norm(sight, axis=1).mean()
+    outside = np.stack([(sensors < low).any(axis=0), (sensors > high).any(axis=0)])  # [side, axis]
+    assumed = np.zeros((2, 2), bool)
+    extent = high - low
+    along = outside[:, ::-1].any(axis=0) & (extent >= FLAT)  # whether a face along the axis was seen
+    toward = places.mean(axis=0) - sensors.mean(axis=0)
+    corner = np.where(toward > 0, low, high)
+    empty = np.linalg.norm(places - corner, axis=1).min()
+    if along.all() and outside.sum() == 2 and empty > max(ROUND * extent.max(), 0.05):
+        return round_box(places, sensors, spacing), np.array([toward < 0, toward > 0]).ravel()
+    for axis in range(2):
+        half = spacing / 2
+        if along[axis]:
+            grazing = np.abs(toward[1 - axis]) / np.linalg.norm(toward)
+            half = min(half / max(grazing, 1e-3), UNSURE / 2)
+            far = int(toward[axis] > 0)
+            assumed[far, axis] = 2 * half >= UNSURE and not outside[far, axis]
+            (high if far else low)[axis] += half if far else -half
+        elif not outside[:, axis].any():
+            low[axis] -= half
+            high[axis] += half
+    for axis in np.flatnonzero(~along):
+        if outside[:, axis].sum() == 1:
+            depth = max(high[axis] - low[axis], high[1 - axis] - low[1 - axis])
+            if outside[0, axis]:
+                high[axis], assumed[1, axis] = low[axis] + depth, True
+            else:
+                low[axis], assumed[0, axis] = high[axis] - depth, True
+    return np.concatenate([low, high]), assumed.ravel()
+
+
+def round_box(places, sensors, spacing):
+    """Box (4,) round something round: as deep along the line of sight as it is wide across it."""
+    sensor = sensors.mean(axis=0)
+    sight = places.mean(axis=0) - sensor
+    sight = sight / np.hypot(*sight)
+    aside = np.array([-sight[1], sight[0]])
+    along, across = (places - sensor) @ sight, (places - sensor) @ aside
+    half = (np.ptp(across) + spacing) / 2
+    middle = sensor + (along.min() + half) * sight + (across.min() + across.max()) / 2 * aside
+    return np.concatenate([middle - half, middle + half])
+
+
+def one_object(boxes, groups, places, scan):
+    """The first pair of groups that are one object, or None."""
+    for i in range(len(boxes)):
+        for j in range(i + 1, len(boxes)):
+            (a, _), (b, _) = boxes[i], boxes[j]
+            apart = np.maximum(np.maximum(a[:2] - b[2:], b[:2] - a[2:]), 0.0)
+            both = np.maximum(a[2:], b[2:]) - np.minimum(a[:2], b[:2])
+            if not apart.any() or (
+                np.hypot(*apart) < SHADOW
+                and both.max() <= ONE_OBJECT
+                and scan is not None
+                and hidden_between(places[groups[i]], places[groups[j]], *scan)
+            ):
+                return i, j
+    return None
+
+
+def bearings_of(places, pose):
+    """Bearings (M,) in rad and distances (M,) in m of places (M, 2) from a sensor's pose (3,)."""
+    offset = places - pose[:2]
+    bearing = np.arctan2(offset[:, 1], offset[:, 0]) - pose[2]
+    return (bearing + np.pi) % (2 * np.pi) - np.pi, np.hypot(offset[:, 0], offset[:, 1])
+
+
+def hidden_between(some, others, pose, angles, ranges):
+    """Whether every beam between two surfaces (M, 2), (L, 2) met something nearer than both."""
+    (a, near_a), (b, near_b) = bearings_of(some, pose), bearings_of(others, pose)
+    low, high = (a.max(), b.min()) if a.mean() < b.mean() else (b.max(), a.min())
+    between = (angles > low) & (angles < high)
+    if np.ptp(angles[between]) > np.pi / 2 if between.any() else False:
+        return False
+    return bool((ranges[between] < min(near_a.min(), near_b.min()) - 0.05).all())
+
+
+def hidden_ends(places, scan):
+    """Whether something nearer, or the edge of view, is beside the right and the left of a surface."""
+    if scan is None:
+        return False, False
+    pose, angles, ranges = scan
+    bearing, distance = bearings_of(places, pose)
+    ends = []
+    for k, side in ((bearing.argmin(), -1), (bearing.argmax(), 1)):
+        beam = int(np.abs(angles - bearing[k]).argmin()) + side
+        while 0 <= beam < len(ranges) and abs(ranges[beam] - distance[k]) < 0.10:
+            beam += side
+        ends.append(not 0 <= beam < len(ranges) or bool(ranges[beam] < distance[k] - 0.10))
+    return tuple(ends)

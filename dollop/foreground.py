@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 from dollop.checks import check_positive
-from dollop.gridmap import in_metres
+from dollop.gridmap import flat_cells, in_metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -428,3 +428,173 @@ def bounding_boxes(blobs, origin, resolution):
         boxes[k, :2] = in_metres(left, bottom, origin, resolution)
         boxes[k, 2:] = in_metres(right, top, origin, resolution)
     return boxes
+
+
+# ---- what stands, remembered in seconds (beyond the paper)
+
+SLOT = 0.15
+"""s: what stands is looked at no more often, however fast the laser is."""
+LONGEST_STEP = 0.5
+"""s: a pause between scans counts for no more."""
+BEYOND = 0.10
+"""m by which a beam must have gone on behind a cell to have passed it."""
+TOUCH = 0.06
+"""m round a cell that stands in which a reading belongs to it."""
+
+
+class StandingCells:
+    """Cells of the map where something stands, and since when (Sec. II, in seconds).
+
+        v <- v + (1 - exp(-dt / tau)) (hit - v),      tau = after / log 2
+
+    for a cell that was hit or that a beam passed, dt the time in s since the last look, so that
+    what is hit stands `after` seconds, whatever the rate of the scans. Cells in the shadow keep v.
+
+    Parameters
+    ----------
+    background : OccupancyGrid
+        Gives origin, resolution and shape.
+    after : float
+        s.
+
+    Attributes
+    ----------
+    cells : (A,) int array
+        Flat indices of the cells that are remembered.
+    value, since : (A,) float arrays
+        v, and the time in s of the first hit.
+    places, sensors : (A, 2) float arrays
+        Mean of the readings in a cell, and where it was seen from last, m.
+    known_since : (H * W,) float array
+        At each cell, and `TOUCH` m round it, since when in s something stands there, else `inf`.
+    """
+
+    COLUMNS = "cells", "value", "since", "places", "sensors", "looks"
+
+    def __init__(self, background, after=1.2):
+        check_positive("after", after)
+        self.tau = after / np.log(2)
+        self.shape, self.resolution = background.occupancy.shape, background.resolution
+        self.origin = np.asarray(background.origin, dtype=float)
+        self.cells, self.value, self.since = np.zeros(0, np.intp), np.zeros(0), np.zeros(0)
+        self.places, self.sensors, self.looks = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
+        size = self.shape[0] * self.shape[1]
+        self._row = np.full(size, -1, np.int32)
+        self.known_since = np.full(size, np.inf)
+        self._known = np.zeros(0, np.intp)
+        reach = max(1, round(TOUCH / self.resolution))
+        near = np.arange(-reach, reach + 1)
+        self._round = (near[:, None] * self.shape[1] + near).ravel()
+        self.gone = {}
+        self.last = None
+
+    def due(self, t):
+        """Whether it is time for another look at `t` s."""
+        return self.last is None or t - self.last >= SLOT
+
+    def look(self, t, cells, points, pose, angles, ranges):
+        """Take in one scan.
+
+        Parameters
+        ----------
+        t : float
+            s.
+        cells : (M,) int array
+            Flat indices of the cells that hold a foreground reading; repeats allowed.
+        points : (M, 2) float array
+            The readings in m.
+        pose : (3,) float array
+            Sensor x, y in m, theta in rad.
+        angles, ranges : (B,) float arrays
+            The scan.
+        """
+        dt = SLOT if self.last is None else min(t - self.last, LONGEST_STEP)
+        self.last = t
+        gain = 1 - np.exp(-dt / self.tau)
+        hit, inverse = np.unique(cells, return_inverse=True)
+        count = np.bincount(inverse, minlength=len(hit))
+        means = np.column_stack([np.bincount(inverse, column, len(hit)) for column in points.T]) / count[:, None]
+        fresh = self._row[hit] < 0
+        if fresh.any():
+            self._remember(hit[fresh], t)
+        rows = self._row[hit]
+        self.looks[rows] += 1
+        self.places[rows] += (means - self.places[rows]) / np.minimum(self.looks[rows], 50)[:, None]
+        self.sensors[rows] = pose[:2]
+        free = seen_free(self.places, pose, angles, ranges, BEYOND)
+        free[rows] = False
+        before = self.value > 0.5
+        self.value[free] -= gain * self.value[free]
+        self.value[rows] += gain * (1 - self.value[rows])
+        ended = np.flatnonzero(before & (self.value <= 0.5))
+        for k in ended.tolist():
+            self.gone[int(self.cells[k])] = (*self.places[k].tolist(), float(self.since[k]), t)
+        forgotten = free & (self.value < 0.5 * gain)
+        if forgotten.any():
+            self._row[self.cells[forgotten]] = -1
+            for name in self.COLUMNS:
+                setattr(self, name, getattr(self, name)[~forgotten])
+            self._row[self.cells] = np.arange(len(self.cells))
+        self._mark()
+
+    def _remember(self, cells, t):
+        """Add cells (M,), seen for the first time at `t` s."""
+        n, none = len(cells), np.zeros(len(cells))
+        self._row[cells] = len(self.cells) + np.arange(n)
+        new = cells, none, np.full(n, t), np.zeros((n, 2)), np.zeros((n, 2)), none
+        for name, values in zip(self.COLUMNS, new, strict=True):
+            setattr(self, name, np.concatenate([getattr(self, name), values]))
+
+    def _mark(self):
+        """Write down at each cell round one that stands since when."""
+        self.known_since[self._known] = np.inf
+        standing = np.flatnonzero(self.value > 0.5)
+        standing = standing[np.argsort(-self.since[standing])]  # the earliest is written last
+        near = (self.cells[standing, None] + self._round).clip(0, self.known_since.size - 1)
+        self._known = near.ravel()
+        self.known_since[self._known] = np.repeat(self.since[standing], len(self._round))
+
+    @property
+    def standing(self):
+        """(S,) rows of the cells where something stands."""
+        return np.flatnonzero(self.value > 0.5)
+
+
+class SeenFloor:
+    """Where beams have passed or ended, and when first (beyond the paper).
+
+    Parameters
+    ----------
+    background : OccupancyGrid
+        Of its extent.
+    resolution : float
+        m per cell.
+    """
+
+    EVERY = 1.0  # s
+
+    def __init__(self, background, resolution=0.10):
+        self.origin, self.resolution = background.origin, resolution
+        self.shape = tuple(np.ceil(np.multiply(background.occupancy.shape, background.resolution / resolution)).astype(int))
+        self.first = np.full(self.shape[0] * self.shape[1], np.inf)
+        self.last = None
+
+    def due(self, t):
+        """Whether it is time for another look at `t` s."""
+        return self.last is None or t - self.last >= self.EVERY
+
+    def look(self, t, pose, angles, ranges, farthest=20.0):
+        """Take in one scan; a beam that does not come back is not believed."""
+        self.last = t
+        back = np.isfinite(ranges) & (ranges < farthest)
+        bearings, reach = pose[2] + angles[back], ranges[back]
+        steps = (reach / self.resolution).astype(int) + 1
+        along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
+        x = pose[0] + np.repeat(np.cos(bearings), steps) * along * self.resolution
+        y = pose[1] + np.repeat(np.sin(bearings), steps) * along * self.resolution
+        cells, _ = flat_cells(np.column_stack([x, y]), self.origin, self.resolution, self.shape)
+        self.first[cells] = np.minimum(self.first[cells], t)
+
+    def grid(self):
+        """(H, W) bool array: seen by now, gaps between beams closed."""
+        return scipy.ndimage.binary_closing(np.isfinite(self.first).reshape(self.shape), np.ones((3, 3)))

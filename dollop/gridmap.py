@@ -264,6 +264,64 @@ class OccupancyGrid:
         distances.flags.writeable = False
         return distances
 
+    def way_length(self, place, other, radius=0.15):
+        """Length of the shortest way on foot from a place to another, round what is occupied.
+
+        Parameters
+        ----------
+        place, other : (2,) sequences of float
+            In m.
+        radius : float
+            Kept from what is occupied, in m.
+
+        Returns
+        -------
+        float
+            In m; `inf` where there is no way.
+
+        Examples
+        --------
+        Round a wall of 1 m that ends at the border of the map there is no way.
+
+        >>> grid = OccupancyGrid(np.pad(np.ones((20, 1)), ((0, 0), (20, 20))), (0.0, 0.0), 0.05)
+        >>> grid.way_length((0.2, 0.5), (0.2, 0.9)), grid.way_length((0.2, 0.5), (1.8, 0.5))
+        (0.4, inf)
+        """
+        place, other = np.asarray(place, dtype=float), np.asarray(other, dtype=float)
+        straight = float(np.linalg.norm(other - place))
+        line = place + np.linspace(0, 1, 2 + int(straight / self.resolution))[:, None] * (other - place)
+        near = self.distance_at(line)
+        if not (near <= self.resolution).any():
+            return straight
+        free, origin, side, graph = self._walkable(radius)
+        start, goal = (self._nearest_free(each, free, origin, side) for each in (place, other))
+        length = scipy.sparse.csgraph.dijkstra(graph, directed=False, indices=start)[goal]
+        return max(straight, float(length))
+
+    def _walkable(self, radius):
+        """Free cells (N, 2) of about 15 cm, lower left corner, their side, and a graph of neighbours."""
+        if self._ways is None:
+            stride = max(1, round(0.15 / self.resolution))
+            free = (self.distance_field() > radius)[::stride, ::stride]
+            number = np.full(free.shape, -1)
+            number[free] = np.arange(free.sum())
+            side, links = stride * self.resolution, []
+            for rows, columns, far in ((0, 1, 1.0), (1, 0, 1.0), (1, 1, np.sqrt(2)), (1, -1, np.sqrt(2))):
+                a = number[: number.shape[0] - rows, max(0, -columns) : number.shape[1] - max(0, columns)]
+                b = number[rows:, max(0, columns) : number.shape[1] - max(0, -columns)]
+                both = (a >= 0) & (b >= 0)
+                links.append((a[both], b[both], np.full(both.sum(), far * side)))
+            i, j, far = map(np.concatenate, zip(*links, strict=True))
+            graph = scipy.sparse.coo_matrix((far, (i, j)), (free.sum(),) * 2).tocsr()
+            self.__dict__["_ways"] = np.argwhere(free), self.origin, side, graph
+        return self._ways
+
+    def _nearest_free(self, place, free, origin, side):
+        """Row of the free cell nearest to a place."""
+        return int(np.linalg.norm(free[:, ::-1] * side + origin - place, axis=1).argmin())
+
+    _ways = None
+
     def distance_at(self, points):
         """Distance from the cell of each point to the nearest occupied one.
 

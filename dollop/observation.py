@@ -1,19 +1,32 @@
-"""Observing the user: from a log and a background map to tracks, user and environment (Fig. 4)."""
+"""Observing the user: from a log and a background map to people, user and environment (Fig. 4)."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from dollop.checks import check_positive
-from dollop.environment import Environment
-from dollop.foreground import ForegroundGrid, bounding_boxes, endpoints, foreground_mask, seen_free, surface_points
-from dollop.gridmap import flat_cells
-from dollop.tracking import Track, Tracker, identify_user, track_objects, user_track
+from dollop.checks import Note, check_choice, check_positive, checked_array, trusted
+from dollop.environment import Environment, Seen, standing_boxes
+from dollop.foreground import (
+    ForegroundGrid,
+    SeenFloor,
+    StandingCells,
+    bounding_boxes,
+    endpoints,
+    foreground_mask,
+    seen_free,
+    surface_points,
+)
+from dollop.gridmap import flat_cells, in_cells
+from dollop.people import Followed, candidates, joined, moving_speed, person_of
+from dollop.tracking import Motion, Track, Tracker, identify_user, track_objects, user_track
+from dollop.trajectory import arc_length
 
-__all__ = ["STATIC_EVERY", "Observation", "foreground_hits", "observe", "static_boxes"]
+__all__ = ["METHODS", "STATIC_EVERY", "Observation", "Observer", "foreground_hits", "observe", "static_boxes"]
 
 STATIC_EVERY = 5
-"""The slow grid looks at every fifth scan: what is static is still there then."""
+"""The paper's slow grid looks at every fifth scan: what is static is still there then."""
+METHODS = "people", "paper"
+"""How somebody is observed: as people, or as the paper has it, every foreground object alike."""
 
 
 @dataclass(frozen=True)
@@ -23,28 +36,347 @@ class Observation:
     Attributes
     ----------
     tracks : tuple of Track
-        Every foreground object, as tracked from scan to scan.
+        Everything that moved, people or not; by the paper's method every foreground object.
     user : Track or None
         The user's trajectory, joined over losses and smoothed; None if nobody moved.
     environment : Environment
         Boxes of the static foreground objects.
     losses : int
-        How often the user was lost and found again as another track.
+        How often the user was lost and found again.
+    people : tuple of Track
+        Everybody who walked, in the order in which they came into sight, each as far as it is surely
+        the same person.
+    notes : tuple of Note
+        What may be wrong, and why.
     """
 
     tracks: tuple
     user: Track
     environment: Environment
     losses: int
+    people: tuple = ()
+    notes: tuple = ()
+
+    @property
+    def trusted(self):
+        """Bool: whether no note puts user, walk or objects in doubt."""
+        return trusted(self.notes)
 
     def __repr__(self):
         return f"Observation of {len(self.tracks)} tracks; user: {self.user}; {self.environment}"
 
 
-def observe(
+def observe(log, background, user="fastest", method="people", background_radius=0.20, min_area=0.01, **paper):
+    """Observe a demonstration with the laser (Sec. II).
+
+    Parameters
+    ----------
+    log : LaserLog
+        The scans.
+    background : OccupancyGrid
+        The background occupancy grid map of the workspace; it must cover the scans.
+    user : str, (x, y) or int
+        Who shows the task: "fastest", of the whole recording; who was nearest to a place in m when
+        first seen; or an index into `Observation.people`.
+    method : str
+        "people", or "paper": every foreground object is tracked alike, its position is the centroid
+        of a blob of the foreground grid, and the user is the fastest of the moment.
+    background_radius : float
+        A reading is foreground if no background object lies within this radius, in m (Sec. II:
+        20 centimetres).
+    min_area : float
+        Smallest foreground object in m^2 (Sec. II: 100 square centimetres).
+    **paper
+        With the paper's method more of `observe_as_paper`.
+
+    Returns
+    -------
+    Observation
+
+    Raises
+    ------
+    ValueError
+        If the map does not cover the scans, nobody was at the place named, or a parameter is out of
+        its range.
+    """
+    check_choice("method", method, METHODS)
+    if method == "paper":
+        return observe_as_paper(log, background, background_radius, min_area=min_area, **paper)
+    if paper:
+        raise ValueError(f'{", ".join(paper)} must come with method="paper"')
+    observer = Observer(background, log.angles, user, background_radius, min_area)
+    observer.take(log.t, log.ranges, log.poses)
+    return observer.observation(log.notes)
+
+
+class Observer:
+    """Observing scan by scan, in bounded memory (Sec. II).
+
+    Of the scans only what may be somebody's way is kept: some 60 bytes a scan for each who walks.
+
+    Parameters
+    ----------
+    background : OccupancyGrid
+        The background occupancy grid map of the workspace.
+    angles : (B,) array_like
+        Bearing of each beam in the sensor's frame in rad, increasing.
+    user, background_radius, min_area
+        As for `observe`.
+
+    Raises
+    ------
+    ValueError
+        For a map in which nothing is known, or a parameter out of its range.
+    """
+
+    def __init__(self, background, angles, user="fastest", background_radius=0.20, min_area=0.01):
+        check_positive("background_radius", background_radius)
+        check_positive("min_area", min_area, or_zero=True)
+        self.background, self.user, self.min_area = background, checked_user(user), min_area
+        angles = checked_array("angles", angles, "B")
+        self._middle = (angles[0] + angles[-1]) / 2  # bearings are counted from the middle of view
+        self.angles = angles - self._middle
+        self.step_angle = float(np.median(np.diff(angles))) if len(angles) > 1 else np.radians(1.0)
+        self._directions = np.cos(self.angles), np.sin(self.angles)
+        self._class = reading_classes(background, background_radius)
+        self.motion, self.followed = Motion(), Followed()
+        self.standing, self.floor = StandingCells(background), SeenFloor(background)
+        self.returned = self.foreground = self.outside = 0
+        self._scan = None
+
+    def step(self, t, ranges, pose):
+        """Take one scan.
+
+        Parameters
+        ----------
+        t : float
+            Time in s, later than the last.
+        ranges : (B,) array_like
+            In m, `inf` where nothing came back.
+        pose : (3,) array_like
+            Sensor in the world: x, y in m, theta in rad.
+
+        Raises
+        ------
+        ValueError
+            For a scan that is older than the last, or numbers that are none.
+        """
+        ranges = checked_array("ranges", ranges, len(self.angles), finite=False)
+        if not (ranges >= 0).all():
+            raise ValueError(f"a range must not be negative or NaN, got {ranges[~(ranges >= 0)][0]}")
+        pose, t = checked_array("pose", pose, 3), float(t)
+        if not np.isfinite(t) or (self.followed.t and t <= self.followed.t[-1]):
+            raise ValueError(f"t must be later than the last scan's {self.followed.t[-1:].tolist()}, got {t}")
+        self.take(np.array([t]), ranges[None], pose[None])
+
+    def take(self, t, ranges, poses):
+        """Take several scans, as `step` takes one: times (T,), ranges (T, B), poses (T, 3)."""
+        poses = np.column_stack([poses[:, :2], poses[:, 2] + self._middle])
+        for some in np.array_split(np.arange(len(t)), 1 + ranges.size // 50_000):
+            self._take(t[some], ranges[some], poses[some])
+
+    def _take(self, t, ranges, poses):
+        """A few scans at once: what does not depend on those before, and then one by one."""
+        scan, beam, x, y, cells = self._readings(ranges, poses)
+        bounds = np.searchsorted(scan, np.arange(len(t) + 1)).tolist()
+        points = np.column_stack([x, y])
+        for i, now in enumerate(t.tolist()):
+            part = slice(bounds[i], bounds[i + 1])
+            here = cells[part]
+            self.followed.step(now, self._candidates(beam[part], x[part], y[part], here, ranges[i], poses[i]))
+            if self.standing.due(now):
+                self.standing.look(now, here, points[part], poses[i], self.angles, ranges[i])
+            if self.floor.due(now):
+                self.floor.look(now, poses[i], self.angles, ranges[i])
+        self._scan = poses[-1], self.angles, ranges[-1]
+
+    def _readings(self, ranges, poses):
+        """Foreground readings: scan, beam, x, y in m and flat cell of each, all (n,)."""
+        cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
+        ahead, left = self._directions
+        x = poses[:, :1] + ranges * (cos * ahead - sin * left)
+        y = poses[:, 1:2] + ranges * (sin * ahead + cos * left)
+        column, row = in_cells(x, y, self.background.origin, self.background.resolution)
+        height, width = self.background.occupancy.shape
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)  # nan and inf are not
+        column, row = np.where(inside, column, 0).astype(np.intp), np.where(inside, row, 0).astype(np.intp)
+        cells = row * width + column
+        kind = np.where(inside, self._class[cells], 0)
+        returned = np.isfinite(ranges)
+        self.returned += int(returned.sum())
+        self.outside += int((returned & ~inside).sum())
+        scan, beam = np.nonzero(kind == FOREGROUND)
+        self.foreground += len(scan)
+        return scan, beam, x[scan, beam], y[scan, beam], cells[scan, beam]
+
+    def _candidates(self, beam, x, y, cells, ranges, pose):
+        """Who may be a person: readings of what does not stand, or of who came to stand there."""
+        since = self.standing.known_since[cells]
+        new = since == np.inf
+        for piece in self.followed.standing():
+            near = np.hypot(x - piece.x, y - piece.y) < STANDING_REACH
+            new |= near & (since >= piece.arrived - 0.5)
+        return candidates(beam[new], x[new], y[new], ranges, pose, self.step_angle)
+
+    def observation(self, notes=()):
+        """What has been seen so far.
+
+        Parameters
+        ----------
+        notes : tuple of Note
+            Of the log.
+
+        Returns
+        -------
+        Observation
+
+        Raises
+        ------
+        ValueError
+            If the map does not cover the scans, or nobody was at the place that was named.
+        """
+        if not self.followed.t:
+            raise ValueError("an observation needs a scan, got none")
+        self._check_map()
+        t = np.array(self.followed.t)
+        area = float(np.clip(self.background.free.sum() * self.background.resolution**2, 5.0, 200.0))
+        persons = joined(self.followed.pieces(), t, area, self.background.way_length, self.motion)
+        tracks = [person_of(each, t, self.motion) for each in persons]
+        walked = [k for k, track in enumerate(tracks) if walks(track)]
+        people = tuple(tracks[k] for k in walked)
+        chosen = choose(people, self.user)
+        user = None if chosen is None else people[chosen]
+        who = None if chosen is None else persons[walked[chosen]]
+        environment, told = self._environment(people)
+        notes = (*notes, *told, *self._map_notes())
+        if user is not None:
+            notes += tuple(user_notes(user, who, people, self.user, self.background))
+        losses = 0 if who is None else len(who.gaps)
+        return Observation(tuple(tracks), user, environment, losses, people, notes)
+
+    def _check_map(self):
+        """The map must cover the scans."""
+        if self.outside > 0.1 * self.returned:
+            share = f"{self.outside} of {self.returned} readings ({100 * self.outside / self.returned:.0f} %)"
+            raise ValueError(f"the background map must cover the scans: {share} lie outside it")
+
+    def _map_notes(self):
+        """Whether the map explains the scans."""
+        share = self.foreground / max(self.returned, 1)
+        if share > MOST_FOREGROUND:
+            text = f"{share:.0%} of the readings are on nothing that the map knows (at most {MOST_FOREGROUND:.0%})"
+            yield Note("map", f"{text}: it does not fit the poses, or the room has changed")
+
+    def _environment(self, people):
+        """The objects that stand at the end, and what is to be noted of them."""
+        cells, rows, now = self.standing, self.standing.standing, self.followed.t[-1]
+        for track in people:
+            if track.t[-1] > now - 1.0:
+                there = np.linalg.norm(cells.places[rows] - track.positions[-1], axis=1) < STANDING_REACH
+                arrived = track.t[np.linalg.norm(track.positions - track.positions[-1], axis=1) > 0.5]
+                since = arrived[-1] if len(arrived) else -np.inf
+                rows = rows[~(there & (cells.since[rows] >= since - 0.5))]
+        places, sensors = cells.places[rows], cells.sensors[rows]
+        boxes, assumed, hidden, _ = standing_boxes(places, sensors, self.step_angle, self._scan, self.min_area)
+        seen = Seen(self.floor.grid(), self.floor.origin, self.floor.resolution)
+        return Environment(boxes, seen, assumed), []
+
+
+STANDING_REACH = 0.5
+"""m from the middle of somebody within which readings are theirs."""
+MOST_FOREGROUND = 0.5
+FOREGROUND, KNOWN, UNKNOWN = 1, 0, 2
+"""What a reading is by the map: not explained; explained; where the map knows of no floor."""
+
+
+def reading_classes(background, radius):
+    """What a reading in each cell of the map is, (H * W,) uint8."""
+    if not (background.free.any() and background.occupied.any()):
+        raise ValueError("the background map must hold free and occupied cells: it knows of nothing")
+    classes = (background.distance_field() > radius).astype(np.uint8)
+    return classes.ravel()
+
+
+def checked_user(user):
+    """Who is to be the user: "fastest", a place (x, y), or an index."""
+    if isinstance(user, str):
+        check_choice("user", user, ("fastest",))
+        return user
+    if isinstance(user, int | np.integer) and not isinstance(user, bool):
+        return int(user)
+    return checked_array("user", user, 2)
+
+
+def walks(track):
+    """Whether somebody walks there, and is no flicker."""
+    away = np.linalg.norm(track.positions - track.positions[0], axis=1).max()
+    return away > 0.6 and np.count_nonzero(~track.occluded) >= 5 and np.ptp(track.t) >= 0.8
+
+
+def choose(people, user):
+    """Index of the user among people, None if nobody walks."""
+    if not people:
+        return None
+    if isinstance(user, int):
+        if not 0 <= user < len(people):
+            raise ValueError(f"user must be one of {len(people)} people, 0 to {len(people) - 1}, got {user}")
+        return user
+    if isinstance(user, str):
+        return int(np.argmax(fastness(people)))
+    away = [np.linalg.norm(track.positions[0] - user) for track in people]
+    k = int(np.argmin(away))
+    if away[k] > NOBODY_THERE:
+        where = ", ".join(f"{i} at ({x:.2f}, {y:.2f})" for i, (x, y) in enumerate(each.positions[0] for each in people))
+        raise ValueError(f"nobody was within {NOBODY_THERE:g} m of {tuple(user.tolist())} when first seen: {where}")
+    return k
+
+
+NOBODY_THERE = 1.5
+"""m from the place named beyond which nobody is meant."""
+LONG_ENOUGH = 0.4
+"""Share of the longest way that the user has walked at least."""
+
+
+def fastness(people):
+    """(K,) speeds in m/s, 0 for those whose way is short beside the longest."""
+    ways = np.array([arc_length(track.positions)[-1] for track in people])
+    return np.where(ways >= LONG_ENOUGH * ways.max(), [moving_speed(track) for track in people], 0.0)
+
+
+def user_notes(user, person, people, choice, background):
+    """What is in doubt about the user."""
+    others = [track for track in people if track is not user]
+    if choice == "fastest" if isinstance(choice, str) else False:
+        speeds = fastness(people)
+        mine = moving_speed(user)
+        near = [s for s, track in zip(speeds, people, strict=True) if track is not user and s > mine - ALIKE]
+        if near:
+            yield Note("people", f"{1 + len(near)} people walk about as fast ({mine:.2f} and {max(near):.2f} m/s)")
+    if person.doubts:
+        yield Note("exchange", f"at {person.doubts[0] - user.t[0]:.1f} s of the walk somebody else may have gone on")
+    way = arc_length(user.positions)[-1]
+    for track in others:
+        gap = max(track.t[0] - user.t[-1], user.t[0] - track.t[-1])
+        ends = (user.positions[-1], track.positions[0]) if track.t[0] > user.t[-1] else (track.positions[-1], user.positions[0])
+        if 0 < gap < 15 and np.linalg.norm(ends[1] - ends[0]) < 2.0 * gap + 0.5 and arc_length(track.positions)[-1] > 0.05 * way:
+            yield Note("pieces", f"somebody walked {arc_length(track.positions)[-1]:.1f} m, {gap:.1f} s apart: it may be the user")
+    if len(person.gaps) and (longest := np.diff(person.gaps).max()) > 4.5:
+        yield Note("gap", f"the user was out of sight for {longest:.1f} s (at most 4.5)")
+    seen = 1 - user.occluded.mean()
+    if seen < 0.6:
+        yield Note("seen", f"the user was in sight for {seen:.0%} of the walk (at least 60 %)")
+    if (top := user.speeds.max()) > 3.0:
+        yield Note("speed", f"the user would have walked at {top:.1f} m/s (at most 3)")
+
+
+ALIKE = 0.15
+"""m/s by which the user must be faster than others."""
+
+
+def observe_as_paper(
     log, background, background_radius=0.20, gain=0.6, static_gain=0.1, min_area=0.01, stride=0.0, tracker=None, seed=0
 ):
-    """Observe a demonstration with the laser (Sec. II).
+    """Observe a demonstration as the paper does (Sec. II): `observe` with method="paper".
 
     Parameters
     ----------

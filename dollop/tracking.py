@@ -106,13 +106,28 @@ class Motion:
         >>> np.allclose(F @ F, F2), np.allclose(F @ Q @ F.T + Q, Q2)
         (True, True)
         """
-        n = self.order
-        F = np.array([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]])
+        F, Q = self.transitions(np.array([dt], dtype=float))
+        return F[0].copy(), Q[0].copy()  # views would be multiplied more slowly
+
+    def transitions(self, dt):
+        """F and Q over several times at once, see `transition`.
+
+        Parameters
+        ----------
+        dt : (N,) float array
+            s.
+
+        Returns
+        -------
+        F, Q : (N, n, n) float arrays
+        """
+        n, one, none = self.order, np.ones_like(dt), np.zeros_like(dt)
+        F = np.array([[one, dt, dt**2 / 2], [none, one, dt], [none, none, one]])
         position = dt**5 / 20, dt**4 / 8, dt**3 / 6
         velocity = dt**4 / 8, dt**3 / 3, dt**2 / 2
         acceleration = dt**3 / 6, dt**2 / 2, dt
         Q = self.noise * np.array([position, velocity, acceleration])
-        return F[:n, :n].copy(), Q[-n:, -n:].copy()  # views would be multiplied more slowly
+        return np.moveaxis(F[:n, :n], -1, 0), np.moveaxis(Q[-n:, -n:], -1, 0)
 
     def birth(self, positions):
         """States of objects at first sight, their velocity unknown (a reconstruction).
@@ -491,8 +506,15 @@ def particle_moments(particles):
     return mean, covariance + 1e-9 * np.eye(len(mean))
 
 
-def smooth(t, measurements, motion=None):
-    """Kalman filter forwards, smoother backwards (Rauch, Tung and Striebel 1965).
+def smooth(t, measurements, motion=None, sd=None):
+    r"""Positions and velocities given all measurements, those before and after (Sec. II).
+
+    What a Kalman filter and a smoother after it give (Rauch, Tung and Striebel 1965), in one step:
+    the states x_n that minimise
+
+        sum |z_n - h^T x_n|^2 / r_n + sum (x_{n+1} - F x_n)^T Q^-1 (x_{n+1} - F x_n) + prior
+
+    solve a linear system whose matrix is a narrow band.
 
     Parameters
     ----------
@@ -502,6 +524,8 @@ def smooth(t, measurements, motion=None):
         Centroids in m, `nan` where the object was occluded; the first must be finite.
     motion : Motion, optional
         The motion model.
+    sd : (N,) float array, optional
+        Standard deviation of each measurement in m; that of the motion model when not given.
 
     Returns
     -------
@@ -518,15 +542,29 @@ def smooth(t, measurements, motion=None):
     >>> bool(np.abs(smooth(t, seen)[0] - circle).max() < 0.05)
     True
     """
-    filtered, predicted, transitions = kalman_filter(t, measurements, motion or Motion())
-    x, P = map(np.concatenate, zip(*filtered, strict=True))
-    if predicted:
-        ahead, ahead_P = map(np.concatenate, zip(*predicted, strict=True))
-        gains = P[:-1] @ np.transpose(transitions, (0, 2, 1)) @ np.linalg.inv(ahead_P)
-        for n in reversed(range(len(gains))):
-            # x_n <- x_n + P_n F^T P_{n+1|n}^-1 (x_{n+1} - x_{n+1|n})
-            x[n] += gains[n] @ (x[n + 1] - ahead[n])
-    return x[:, 0], x[:, 1]
+    motion = motion or Motion()
+    n, count = motion.order, len(t)
+    seen = np.isfinite(measurements[:, 0])
+    variance = np.full(count, motion.measurement_sd**2) if sd is None else np.square(sd)
+    weights = np.where(seen, 1 / variance, 0.0)
+    blocks = np.zeros((count, n, n))
+    blocks[:, 0, 0] = weights
+    blocks[0] += np.diag([0.0, 1.0, 1.0][:n])  # what is unknown at first sight, as in `Motion.birth`
+    F, Q = motion.transitions(np.diff(t))
+    information = np.linalg.inv(Q)
+    ahead = -np.transpose(F, (0, 2, 1)) @ information
+    blocks[:-1] -= ahead @ F
+    blocks[1:] += information
+    band = np.zeros((2 * n, count * n))  # band[d, m] is row m + d, column m of the matrix
+    for i in range(n):
+        for j in range(n):
+            if i >= j:
+                band[i - j, j::n] = blocks[:, i, j]
+            band[n + j - i, i : (count - 1) * n : n] = ahead[:, i, j]
+    known = np.zeros((count * n, 2))
+    known[::n] = weights[:, None] * np.where(seen[:, None], measurements, 0.0)
+    states = scipy.linalg.solveh_banded(band, known, lower=True).reshape(count, n, 2)
+    return states[:, 0], states[:, 1]
 
 
 def kalman_filter(t, measurements, motion, carry_on=None):

@@ -1,0 +1,490 @@
+"""People: who walks where, from the foreground readings that do not stand (Sec. II).
+
+The paper follows every foreground object alike and calls the fastest of the moment the user. With a
+second person, a box that hides the user, or a laser at the height of legs, that joins pieces of
+different people. Here a person is followed in three steps:
+
+1. In each scan, readings beside each other that do not belong to something that stands are one
+   candidate; narrow ones within a stride are the two legs of one. A reading alone between a nearer
+   and a farther surface is a mixed pixel, and nobody.
+2. Candidates are followed by the Kalman filter of `dollop.tracking` for as long as they are in
+   sight: that is a piece of a person's way.
+3. Pieces are joined where only one person can have walked both. With the end (x, v) of one, the
+   beginning (x', v') of another and the gap g between them,
+
+       e = (x' - x - g v, v' - v),    S = Q(g) + P,
+       log odds = log N(e; 0, S) - log N(v'; 0, 1 m/s) + log(area) + prior,
+
+   it is the same person rather than somebody new, if the way round the walls can be walked in time.
+   The best assignment of all ends to all beginnings is taken; a joint for which another assignment
+   is nearly as good is not made.
+"""
+
+from array import array
+from dataclasses import dataclass
+from math import hypot, log, pi, sqrt
+
+import numpy as np
+import scipy
+
+from dollop.tracking import Motion, Track, smooth
+
+__all__ = ["Followed", "Person", "candidates", "joined", "moving_speed", "person_of"]
+
+JUMP, SPREAD = 0.12, 1.5
+"""Neighbouring readings farther apart than `JUMP` m plus `SPREAD` beam spacings are different surfaces."""
+EDGE = 0.10
+"""m: a neighbouring beam so much nearer or farther has met something else."""
+NARROW, STRIDE = 0.26, 0.65
+"""m: a candidate narrower than this may be a leg; two such nearer than this are one person."""
+WIDEST = 0.60
+"""m: nobody is wider."""
+SURE, VAGUE = 0.05, 0.14
+"""Standard deviations in m of the middle of a body seen whole, or as two legs; of one leg or a body
+half hidden."""
+GATE, GATE_MIN, GATE_MAX = 3.0, 0.45, 1.0
+"""Standard deviations, and bounds in m, within which a candidate is taken for who was expected."""
+PATIENCE = 0.6
+"""s out of sight after which a piece ends: what comes then is for `joined` to say."""
+ALONE = 0.65
+"""m round somebody in which a narrow candidate is not somebody new."""
+MOVED, STANDS_WITHIN = 0.5, 0.5
+"""m from where it began, from which on a piece is of somebody who walks; and m within which who
+walked is standing."""
+ROW = 7
+"""Numbers kept of a measurement: scan, x, y of the near side, sight (2), width, standard deviation."""
+
+
+def candidates(beam, x, y, ranges, pose, step):
+    """Who may be a person in one scan.
+
+    Parameters
+    ----------
+    beam : (n,) int array
+        Beams with foreground readings that do not stand, ascending.
+    x, y : (n,) float arrays
+        Where they ended, m.
+    ranges : (B,) float array
+        The whole scan in m.
+    pose : (3,) float sequence
+        Of the sensor.
+    step : float
+        Angle between beams in rad.
+
+    Returns
+    -------
+    list of tuple
+        x, y of the near side in m, sight (2) from the sensor as a unit vector, width in m, standard
+        deviation in m. The middle is half of the width times pi/4 behind the near side; of two legs
+        it is given itself, with width 0.
+    """
+    n = len(beam)
+    if n == 0:
+        return []
+    steps = np.hypot(x[1:] - x[:-1], y[1:] - y[:-1])
+    near = ranges[beam]
+    apart = (beam[1:] - beam[:-1] > 2) | (steps > JUMP + SPREAD * step * near[1:])
+    starts = [0, *(np.flatnonzero(apart) + 1).tolist()]
+    sums = zip(np.add.reduceat(x, starts).tolist(), np.add.reduceat(y, starts).tolist(), strict=True)
+    whole, narrow = [], []
+    for first, last, (sum_x, sum_y) in zip(starts, [*starts[1:], n], sums, strict=True):
+        count = last - first
+        right, left = int(beam[first]), int(beam[last - 1])
+        before = ranges[right - 1] - near[first] if right else -1.0
+        after = ranges[left + 1] - near[last - 1] if left + 1 < len(ranges) else -1.0
+        if count == 1 and min(before, after) < -EDGE and max(before, after) > EDGE:
+            continue  # a mixed pixel
+        sum_x, sum_y = sum_x / count, sum_y / count
+        ux, uy = sum_x - pose[0], sum_y - pose[1]
+        distance = hypot(ux, uy) or 1e-9
+        width = min((left - right + 1) * step * distance, WIDEST)
+        hidden = before < -EDGE or after < -EDGE
+        found = (sum_x, sum_y, ux / distance, uy / distance, width, VAGUE if hidden else SURE)
+        (narrow if width < NARROW else whole).append(found)
+    return whole + paired(narrow) if narrow else whole
+
+
+def paired(narrow):
+    """Candidates of narrow ones: two within a stride are one person's legs, nearest pairs first."""
+    legs = [(each[0] + push * each[2], each[1] + push * each[3]) for each in narrow for push in [pi / 8 * each[4]]]
+    pairs = sorted(
+        (hypot(legs[i][0] - legs[j][0], legs[i][1] - legs[j][1]), i, j) for i in range(len(legs)) for j in range(i)
+    )
+    used, found = set(), []
+    for apart, i, j in pairs:
+        if apart < STRIDE and not {i, j} & used:
+            used |= {i, j}
+            x, y = (legs[i][0] + legs[j][0]) / 2, (legs[i][1] + legs[j][1]) / 2
+            found.append((x, y, *narrow[i][2:4], 0.0, SURE + 0.02))
+    return found + [(*each[:5], VAGUE) for i, each in enumerate(narrow) if i not in used]
+
+
+class Piece:
+    """Somebody in sight: the state of the Kalman filter of `dollop.tracking`, and what was measured.
+
+    Both axes share one covariance, P = [[pxx, pxv], [pxv, pvv]].
+    """
+
+    __slots__ = "x y vx vy pxx pxv pvv seen rows begin far anchor arrived".split()
+
+    def __init__(self, place, t):
+        self.x, self.y, self.vx, self.vy = *place, 0.0, 0.0
+        self.pxx, self.pxv, self.pvv = SURE**2, 0.0, 1.0
+        self.seen, self.rows, self.far = t, array("d"), 0.0
+        self.begin, self.anchor, self.arrived = place, place, t
+
+    def predict(self, dt, q):
+        """x <- F x, P <- F P F^T + Q over a time in s, for a noise of density q in m^2/s^3."""
+        self.x += dt * self.vx
+        self.y += dt * self.vy
+        self.pxx += dt * (2 * self.pxv + dt * self.pvv) + q * dt**3 / 3
+        self.pxv += dt * self.pvv + q * dt * dt / 2
+        self.pvv += q * dt
+
+    def update(self, x, y, variance, t):
+        """Kalman update with a place in m of some variance in m^2, seen at a time in s."""
+        position = self.pxx / (self.pxx + variance)
+        velocity = self.pxv / (self.pxx + variance)
+        dx, dy = x - self.x, y - self.y
+        self.x += position * dx
+        self.y += position * dy
+        self.vx += velocity * dx
+        self.vy += velocity * dy
+        self.pvv -= velocity * self.pxv
+        self.pxv *= 1 - position
+        self.pxx *= 1 - position
+        self.seen = t
+        self.far = max(self.far, hypot(self.x - self.begin[0], self.y - self.begin[1]))
+        if hypot(self.x - self.anchor[0], self.y - self.anchor[1]) > STANDS_WITHIN:
+            self.anchor, self.arrived = (self.x, self.y), t
+
+
+class Followed:
+    """Everybody who has been in sight, piece by piece (Sec. II).
+
+    Parameters
+    ----------
+    motion : Motion, optional
+        How people move; position and velocity.
+    """
+
+    def __init__(self, motion=None):
+        self.noise = (motion or Motion()).noise
+        self.t, self.alive, self.past, self.now = array("d"), [], [], None
+
+    def standing(self):
+        """Pieces of those who walked and may be standing now."""
+        return [piece for piece in self.alive if piece.far > MOVED]
+
+    def step(self, t, found):
+        """Match those in sight with the candidates of the next scan.
+
+        Parameters
+        ----------
+        t : float
+            Time in s, later than the last.
+        found : list of tuple
+            From `candidates`.
+        """
+        scan = len(self.t)
+        dt = t - self.t[-1] if scan else 0.0
+        self.t.append(t)
+        for piece in self.alive:
+            piece.predict(dt, self.noise)
+        if found:
+            self._match(t, scan, found)
+        if self.alive and min(piece.seen for piece in self.alive) < t - PATIENCE:
+            self.past += [piece for piece in self.alive if piece.seen < t - PATIENCE and worth_keeping(piece)]
+            self.alive = [piece for piece in self.alive if piece.seen >= t - PATIENCE]
+
+    def _match(self, t, scan, found):
+        """Greedily: nearest pairs of piece and candidate first; who is left over is somebody new."""
+        middles = [(x + pi / 8 * w * ux, y + pi / 8 * w * uy) for x, y, ux, uy, w, _ in found]
+        free, pairs = set(range(len(found))), []
+        for k, piece in enumerate(self.alive):
+            for m, (x, y) in enumerate(middles):
+                variance = piece.pxx + found[m][5] ** 2
+                gate = min(max(GATE * sqrt(variance), GATE_MIN), GATE_MAX)
+                apart = hypot(x - piece.x, y - piece.y)
+                if apart < gate:
+                    pairs.append((apart / gate, k, m))
+        taken = set()
+        for _, k, m in sorted(pairs):
+            if k not in taken and m in free:
+                taken.add(k)
+                free.discard(m)
+                self.alive[k].update(*middles[m], found[m][5] ** 2, t)
+                self.alive[k].rows.extend((scan, *found[m]))
+        for m in free:
+            x, y = middles[m]
+            leg = found[m][4] < NARROW
+            if leg and any(hypot(piece.x - x, piece.y - y) < ALONE and piece.seen == t for piece in self.alive):
+                continue
+            piece = Piece((x, y), t)
+            piece.rows.extend((scan, *found[m]))
+            self.alive.append(piece)
+
+    def pieces(self):
+        """Measurements of every piece, list of (n, 7) float arrays in the order of their beginning."""
+        kept = self.past + [piece for piece in self.alive if worth_keeping(piece)]
+        rows = [np.frombuffer(piece.rows).reshape(-1, ROW).copy() for piece in kept]
+        return sorted(rows, key=lambda each: each[0, 0])
+
+
+def worth_keeping(piece):
+    """Whether a piece may be of somebody's way: seen three times, and not all in one place."""
+    return len(piece.rows) >= 3 * ROW and piece.far > 0.25
+
+
+# ---- pieces of one person's way
+
+LONGEST_GAP, REACH, SLACK = 6.0, 2.0, 0.5
+"""s, m/s and m: a gap between pieces is bridged up to so long, where the way can be walked so fast,
+and a little more."""
+PRIOR = 3.0
+"""Log odds, before anything is seen, that who comes into sight is who was last seen."""
+DOUBTFUL = 2.0
+"""Log odds over the next best assignment below which a joint is not made."""
+END = np.array([[0.08**2, 0.0], [0.0, 0.25**2]])
+"""Covariance, m and m/s, of where and how fast somebody was at the end of a piece."""
+CLOSE, BESIDE = 0.8, 0.6
+"""m from somebody out of sight within which another may be taken for them; and within which both
+may be one candidate."""
+SHORT_GAP = 0.15
+"""s: who is out of sight for less cannot be confused."""
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """One person's way, piece by piece.
+
+    Attributes
+    ----------
+    rows : (n, 7) float array
+        Measurements, see `Followed.pieces`.
+    gaps : (G, 2) float array
+        When each bridged gap begins and ends, in s.
+    doubts : tuple of float
+        When, in s, somebody else may have gone on as this person.
+    """
+
+    rows: np.ndarray
+    gaps: np.ndarray
+    doubts: tuple
+
+
+def middles_of(rows, behind=None):
+    """(n, 2) middles in m: the near side moved along the sight by pi/4 of the body's depth there.
+
+    `behind` (n,) is half of that depth in m, half of the width when not given.
+    """
+    behind = rows[:, 5] / 2 if behind is None else np.where(rows[:, 5] > 0, behind, 0.0)
+    return rows[:, 1:3] + (pi / 4 * behind)[:, None] * rows[:, 3:5]
+
+
+def joined(pieces, t, area, way=None, motion=None):
+    """Join pieces that only one person can have walked.
+
+    Parameters
+    ----------
+    pieces : list of (n, 7) float arrays
+        From `Followed.pieces`.
+    t : (T,) float array
+        Time of each scan in s.
+    area : float
+        Of the floor where somebody new may come into sight, in m^2.
+    way : callable, optional
+        way(place, other) is the length in m of the way between two places round the walls.
+    motion : Motion, optional
+        How people move.
+
+    Returns
+    -------
+    list of Person
+        In the order in which they came into sight.
+    """
+    motion = motion or Motion()
+    pieces = apart_where_confused(pieces, t)
+    ends = [ends_of(rows, t, motion) for rows in pieces]
+    odds = np.zeros((len(pieces), len(pieces)))
+    for i, (_, last) in enumerate(ends):
+        for j, (first, _) in enumerate(ends):
+            odds[i, j] = log_odds(last, first, area, way, motion)
+    after, doubts = best_assignment(odds)
+    persons, begun = [], set(after.values())
+    for i in range(len(pieces)):
+        if i in begun:
+            continue
+        chain = [i]
+        while chain[-1] in after:
+            chain.append(after[chain[-1]])
+        gaps = [(ends[a][1][0], ends[b][0][0]) for a, b in zip(chain[:-1], chain[1:], strict=True)]
+        when = [ends[a][1][0] for a in chain if a in doubts[0]] + [ends[b][0][0] for b in chain if b in doubts[1]]
+        rows = np.concatenate([pieces[k] for k in chain])
+        persons.append(Person(rows, np.array(gaps).reshape(-1, 2), tuple(sorted(when))))
+    return persons
+
+
+def ends_of(rows, t, motion):
+    """Time in s, place in m and velocity in m/s, (2,) each, at the beginning and the end of a piece."""
+    scans = rows[:, 0].astype(int)
+    states = []
+    for part in (slice(0, 12), slice(-12, None)):
+        place, velocity = smooth(t[scans[part]], middles_of(rows[part]), motion, rows[part, 6])
+        k = 0 if part.start == 0 else -1
+        states.append((t[scans[part]][k], place[k], velocity[k]))
+    return states
+
+
+def log_odds(last, first, area, way, motion):
+    """Log odds that who was last seen is who comes into sight, 0 where it cannot be."""
+    gap, offset = first[0] - last[0], first[1] - last[1]
+    reach = REACH * gap + SLACK
+    if not 0 < gap <= LONGEST_GAP or hypot(*offset) > reach:
+        return 0.0
+    F, Q = motion.transition(gap)
+    S = Q + F @ END @ F.T + END
+    error = np.array([offset - gap * last[2], first[2] - last[2]])
+    fit = -0.5 * np.sum(error * np.linalg.solve(S, error)) - log(np.linalg.det(S)) - 2 * log(2 * pi)
+    anew = -log(area) - 0.5 * np.sum(first[2] ** 2) - log(2 * pi)
+    odds = fit - anew + PRIOR
+    if odds <= 0 or (way is not None and way(last[1], first[1]) > reach):
+        return 0.0
+    return float(odds)
+
+
+def best_assignment(odds):
+    """Which piece goes on as which, and where that is in doubt.
+
+    Parameters
+    ----------
+    odds : (N, N) float array
+        Log odds that piece i goes on as piece j, 0 where it cannot.
+
+    Returns
+    -------
+    after : dict of int to int
+    doubts : (set, set) of int
+        Pieces whose end, and whose beginning, may belong to another as well.
+
+    Examples
+    --------
+    Two go in and two come out, and it may be either way round:
+
+    >>> best_assignment(np.array([[0, 0, 5.0, 4.5], [0, 0, 4.5, 5.0], [0, 0, 0, 0], [0, 0, 0, 0]]))
+    ({}, ({0, 1}, {2, 3}))
+    """
+    after, doubts = {}, (set(), set())
+    n = len(odds)
+    ends, begins = np.nonzero(odds)
+    graph = scipy.sparse.coo_matrix((np.ones(len(ends)), (ends, n + begins)), (2 * n, 2 * n))
+    _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    for label in np.unique(part[ends]):
+        rows, columns = np.flatnonzero(part[:n] == label), np.flatnonzero(part[n:] == label)
+        values = odds[np.ix_(rows, columns)]
+        chosen = scipy.optimize.linear_sum_assignment(values, maximize=True)
+        total = values[chosen].sum()
+        for i, j in zip(*chosen, strict=True):
+            if values[i, j] == 0:
+                continue
+            without = values.copy()
+            without[i, j] = 0.0
+            other = scipy.optimize.linear_sum_assignment(without, maximize=True)
+            rivals = without[other].sum() > total - values[i, j] + 1e-9
+            if rivals and total - without[other].sum() < DOUBTFUL:
+                doubts[0].add(int(rows[i]))
+                doubts[1].add(int(columns[j]))
+            else:
+                after[int(rows[i])] = int(columns[j])
+    return after, doubts
+
+
+def apart_where_confused(pieces, t):
+    """Cut pieces where somebody is out of sight so near to another that the two may be confused."""
+    cuts = [[] for _ in pieces]
+    times = [t[rows[:, 0].astype(int)] for rows in pieces]
+    places = [middles_of(rows) for rows in pieces]
+    for a, when in enumerate(times):
+        holes = np.flatnonzero(np.diff(when) > SHORT_GAP + np.median(np.diff(t)))
+        for begin, end in zip(when[holes], when[holes + 1], strict=True):
+            between = np.array([np.interp((begin + end) / 2, when, column) for column in places[a].T])
+            for b, other in enumerate(times):
+                there = (other >= begin) & (other <= end)
+                if b == a or not there.any():
+                    continue
+                nearest = np.linalg.norm(places[b][there] - between, axis=1).min()
+                if nearest < CLOSE:
+                    cuts[a].append((begin, end))
+                if nearest < BESIDE:
+                    cuts[b].append((begin, end))
+    parts = []
+    for rows, when, holes in zip(pieces, times, cuts, strict=True):
+        kept = np.ones(len(rows), bool)
+        part = np.zeros(len(rows), int)
+        for begin, end in holes:
+            kept &= ~((when > begin) & (when < end))
+            part += when >= end
+        parts += [rows[kept & (part == k)] for k in np.unique(part)]
+    return sorted((rows for rows in parts if len(rows) >= 3), key=lambda rows: rows[0, 0])
+
+
+def person_of(person, t, motion=None):
+    """A person's track: the middle of the body at every scan, smoothed.
+
+    How deep a body is behind its near side depends on which way it faces. With half axes a across
+    and b along the way it goes, at an angle phi to the sight,
+
+        (w/2)^2 = a^2 cos^2 phi + b^2 sin^2 phi,       d^2 = a^2 sin^2 phi + b^2 cos^2 phi,
+
+    a and b come from the widths w of all scans, and the middle is pi/4 d behind the near side.
+
+    Parameters
+    ----------
+    person : Person
+    t : (T,) float array
+        Time of each scan in s.
+    motion : Motion, optional
+        How people move.
+
+    Returns
+    -------
+    Track
+    """
+    rows = person.rows
+    scans = rows[:, 0].astype(int)
+    lived = t[scans[0] : scans[-1] + 1]
+    seen = scans - scans[0]
+
+    def smoothed(middles):
+        measurements, sd = np.full((len(lived), 2), np.nan), np.full(len(lived), SURE)
+        measurements[seen], sd[seen] = middles, rows[:, 6]
+        return measurements, *smooth(lived, measurements, motion, sd)
+
+    _, _, velocities = smoothed(middles_of(rows))
+    behind = half_depth(rows, velocities[seen])
+    measurements, positions, velocities = smoothed(middles_of(rows, behind))
+    return Track(lived, positions, velocities, np.isnan(measurements[:, 0]), measurements)
+
+
+def half_depth(rows, velocities):
+    """(n,) half of the depth in m behind each near side, from the widths of all."""
+    speed = np.maximum(np.hypot(*velocities.T), 1e-9)
+    along = ((velocities * rows[:, 3:5]).sum(axis=1) / speed) ** 2  # cos^2 phi
+    whole = (rows[:, 5] >= NARROW) & (rows[:, 6] < VAGUE)
+    if not whole.any():
+        return rows[:, 5] / 2
+    square = (rows[whole, 5] / 2) ** 2
+    typical = np.median(square)
+    moving = speed[whole] > 0.3
+    forms = np.column_stack([along[whole], 1 - along[whole]])[moving]
+    pull = 10.0  # as many widths of a round body
+    a2, b2 = np.linalg.solve(forms.T @ forms + pull * np.eye(2), forms.T @ square[moving] + pull * typical)
+    mean = (a2 + b2) / 2
+    depth = np.where(speed > 0.3, a2 * (1 - along) + b2 * along, mean)
+    return np.sqrt(np.clip(depth, 0.05**2, (WIDEST / 2) ** 2))
+
+
+def moving_speed(track):
+    """Median speed in m/s while somebody moves, 0 for who never does."""
+    moving = track.speeds[~track.occluded & (track.speeds > 0.25)]
+    return float(np.median(moving)) if len(moving) else 0.0
