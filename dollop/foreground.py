@@ -461,22 +461,25 @@ class StandingCells:
     ----------
     cells : (A,) int array
         Flat indices of the cells that are remembered.
-    value, since : (A,) float arrays
-        v, and the time in s of the first hit.
+    value, since, until : (A,) float arrays
+        v, and the times in s of the first and the last hit.
     places, sensors : (A, 2) float arrays
         Mean of the readings in a cell, and where it was seen from last, m.
     known_since : (H * W,) float array
         At each cell, and `TOUCH` m round it, since when in s something stands there, else `inf`.
+    gone : dict of int to (6,) tuple
+        By cell where something stood and is no more: place (2) and sensor (2) in m, since, until.
     """
 
-    COLUMNS = "cells", "value", "since", "places", "sensors", "looks"
+    COLUMNS = "cells", "value", "since", "until", "places", "sensors", "looks"
 
     def __init__(self, background, after=1.2):
         check_positive("after", after)
         self.tau = after / np.log(2)
         self.shape, self.resolution = background.occupancy.shape, background.resolution
         self.origin = np.asarray(background.origin, dtype=float)
-        self.cells, self.value, self.since = np.zeros(0, np.intp), np.zeros(0), np.zeros(0)
+        self.cells, self.value = np.zeros(0, np.intp), np.zeros(0)
+        self.since, self.until = np.zeros(0), np.zeros(0)
         self.places, self.sensors, self.looks = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
         size = self.shape[0] * self.shape[1]
         self._row = np.full(size, -1, np.int32)
@@ -520,7 +523,7 @@ class StandingCells:
         rows = self._row[hit]
         self.looks[rows] += 1
         self.places[rows] += (means - self.places[rows]) / np.minimum(self.looks[rows], 50)[:, None]
-        self.sensors[rows] = pose[:2]
+        self.sensors[rows], self.until[rows] = pose[:2], t
         free = seen_free(self.places, pose, angles, ranges, BEYOND)
         free[rows] = False
         before = self.value > 0.5
@@ -528,7 +531,8 @@ class StandingCells:
         self.value[rows] += gain * (1 - self.value[rows])
         ended = np.flatnonzero(before & (self.value <= 0.5))
         for k in ended.tolist():
-            self.gone[int(self.cells[k])] = (*self.places[k].tolist(), float(self.since[k]), t)
+            when = float(self.since[k]), float(self.until[k])
+            self.gone[int(self.cells[k])] = (*self.places[k].tolist(), *self.sensors[k].tolist(), *when)
         forgotten = free & (self.value < 0.5 * gain)
         if forgotten.any():
             self._row[self.cells[forgotten]] = -1
@@ -541,7 +545,7 @@ class StandingCells:
         """Add cells (M,), seen for the first time at `t` s."""
         n, none = len(cells), np.zeros(len(cells))
         self._row[cells] = len(self.cells) + np.arange(n)
-        new = cells, none, np.full(n, t), np.zeros((n, 2)), np.zeros((n, 2)), none
+        new = cells, none, np.full(n, t), np.full(n, t), np.zeros((n, 2)), np.zeros((n, 2)), none
         for name, values in zip(self.COLUMNS, new, strict=True):
             setattr(self, name, np.concatenate([getattr(self, name), values]))
 

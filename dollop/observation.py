@@ -17,7 +17,7 @@ from dollop.foreground import (
     surface_points,
 )
 from dollop.gridmap import flat_cells, in_cells
-from dollop.people import Followed, candidates, joined, moving_speed, person_of
+from dollop.people import Followed, candidates, joined, moving_speed, off_standing, person_of, stood
 from dollop.tracking import Motion, Track, Tracker, identify_user, track_objects, user_track
 from dollop.trajectory import arc_length
 
@@ -240,7 +240,12 @@ class Observer:
         self._check_map()
         t = np.array(self.followed.t)
         area = float(np.clip(self.background.free.sum() * self.background.resolution**2, 5.0, 200.0))
-        persons = joined(self.followed.pieces(), t, area, self.background.way_length, self.motion)
+        cells, rows = self.standing, self.standing.standing
+        pieces = off_standing(self.followed.pieces(), cells.places[rows], cells.since[rows], t)
+        gone = np.array(list(cells.gone.values())).reshape(-1, 6)
+        standing, _ = stood(gone, pieces, t, self.step_angle)
+        pieces = sorted(standing + pieces, key=lambda each: each[0, 0])
+        persons = joined(pieces, t, area, self.background.way_length, self.motion)
         tracks = [person_of(each, t, self.motion) for each in persons]
         walked = [k for k, track in enumerate(tracks) if walks(track)]
         people = tuple(tracks[k] for k in walked)

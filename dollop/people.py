@@ -28,8 +28,9 @@ import numpy as np
 import scipy
 
 from dollop.tracking import Motion, Track, smooth
+from dollop.trajectory import arc_length, at_arc_length
 
-__all__ = ["Followed", "Person", "candidates", "joined", "moving_speed", "person_of"]
+__all__ = ["Followed", "Person", "candidates", "joined", "moving_speed", "off_standing", "person_of", "stood"]
 
 JUMP, SPREAD = 0.12, 1.5
 """Neighbouring readings farther apart than `JUMP` m plus `SPREAD` beam spacings are different surfaces."""
@@ -51,8 +52,9 @@ ALONE = 0.65
 MOVED, STANDS_WITHIN = 0.5, 0.5
 """m from where it began, from which on a piece is of somebody who walks; and m within which who
 walked is standing."""
-ROW = 7
-"""Numbers kept of a measurement: scan, x, y of the near side, sight (2), width, standard deviation."""
+ROW = 8
+"""Numbers kept of a measurement: scan, x, y of the near side, sight (2), width, standard deviation,
+and the side that something nearer hides: 1 left, -1 right, 2 both, 0 none."""
 
 
 def candidates(beam, x, y, ranges, pose, step):
@@ -75,8 +77,8 @@ def candidates(beam, x, y, ranges, pose, step):
     -------
     list of tuple
         x, y of the near side in m, sight (2) from the sensor as a unit vector, width in m, standard
-        deviation in m. The middle is half of the width times pi/4 behind the near side; of two legs
-        it is given itself, with width 0.
+        deviation in m, hidden side. The middle is half of the width times pi/4 behind the near
+        side; of two legs it is given itself, with width 0.
     """
     n = len(beam)
     if n == 0:
@@ -98,8 +100,8 @@ def candidates(beam, x, y, ranges, pose, step):
         ux, uy = sum_x - pose[0], sum_y - pose[1]
         distance = hypot(ux, uy) or 1e-9
         width = min((left - right + 1) * step * distance, WIDEST)
-        hidden = before < -EDGE or after < -EDGE
-        found = (sum_x, sum_y, ux / distance, uy / distance, width, VAGUE if hidden else SURE)
+        hidden = 2.0 if before < -EDGE and after < -EDGE else float(after < -EDGE) - float(before < -EDGE)
+        found = (sum_x, sum_y, ux / distance, uy / distance, width, VAGUE if hidden else SURE, hidden)
         (narrow if width < NARROW else whole).append(found)
     return whole + paired(narrow) if narrow else whole
 
@@ -115,8 +117,8 @@ def paired(narrow):
         if apart < STRIDE and not {i, j} & used:
             used |= {i, j}
             x, y = (legs[i][0] + legs[j][0]) / 2, (legs[i][1] + legs[j][1]) / 2
-            found.append((x, y, *narrow[i][2:4], 0.0, SURE + 0.02))
-    return found + [(*each[:5], VAGUE) for i, each in enumerate(narrow) if i not in used]
+            found.append((x, y, *narrow[i][2:4], 0.0, SURE + 0.02, 0.0))
+    return found + [(*each[:5], VAGUE, each[6]) for i, each in enumerate(narrow) if i not in used]
 
 
 class Piece:
@@ -199,7 +201,7 @@ class Followed:
 
     def _match(self, t, scan, found):
         """Greedily: nearest pairs of piece and candidate first; who is left over is somebody new."""
-        middles = [(x + pi / 8 * w * ux, y + pi / 8 * w * uy) for x, y, ux, uy, w, _ in found]
+        middles = [(x + pi / 8 * w * ux, y + pi / 8 * w * uy) for x, y, ux, uy, w, *_ in found]
         free, pairs = set(range(len(found))), []
         for k, piece in enumerate(self.alive):
             for m, (x, y) in enumerate(middles):
@@ -225,7 +227,7 @@ class Followed:
             self.alive.append(piece)
 
     def pieces(self):
-        """Measurements of every piece, list of (n, 7) float arrays in the order of their beginning."""
+        """Measurements of every piece, list of (n, 8) float arrays in the order of their beginning."""
         kept = self.past + [piece for piece in self.alive if worth_keeping(piece)]
         rows = [np.frombuffer(piece.rows).reshape(-1, ROW).copy() for piece in kept]
         return sorted(rows, key=lambda each: each[0, 0])
@@ -234,6 +236,105 @@ class Followed:
 def worth_keeping(piece):
     """Whether a piece may be of somebody's way: seen three times, and not all in one place."""
     return len(piece.rows) >= 3 * ROW and piece.far > 0.25
+
+
+# ---- what stood, and who walked from there
+
+STOOD_LINK, WIDE = 0.35, 0.75
+"""m: cells so near to each other stood and went together; what is wider than that is nobody."""
+BEGAN = 1.0
+"""s: who begins to walk so soon before or after what stood there was seen last is who stood there."""
+ON = 0.20
+"""m from a cell that stands within which a measurement is of what stands."""
+
+
+def stood(gone, pieces, t, step):
+    """Pieces of those who stood before they walked, and what else stood and went.
+
+    Parameters
+    ----------
+    gone : (G, 6) float array
+        Cells where something stood and is no more: place and sensor in m, since and until in s.
+    pieces : list of (n, 8) float arrays
+        From `Followed.pieces`.
+    t : (T,) float array
+        Time of each scan in s.
+    step : float
+        Angle between beams in rad.
+
+    Returns
+    -------
+    list of (n, 8) float arrays
+        One for each thing that a person may be.
+    groups : list of (G_k, 6) float arrays
+        All that went, those first that may be people.
+    """
+    if not len(gone):
+        return [], []
+    pairs = scipy.spatial.cKDTree(gone[:, :2]).query_pairs(STOOD_LINK, output_type="ndarray")
+    together = np.minimum(*gone[pairs, 5].T) > np.maximum(*gone[pairs, 4].T) if len(pairs) else np.zeros(0, bool)
+    i, j = pairs[together].T if len(pairs) else (np.zeros(0, int),) * 2
+    graph = scipy.sparse.coo_matrix((np.ones(len(i)), (i, j)), (len(gone),) * 2)
+    _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    found, things, others = [], [], []
+    for k in np.unique(label):
+        group = gone[label == k]
+        rows = standing_rows(group, pieces, t, step)
+        if rows is None:
+            others.append(group)
+        else:
+            found.append(rows)
+            things.append(group)
+    return found, things + others
+
+
+def standing_rows(group, pieces, t, step):
+    """Measurements (n, 8) of somebody who stood where a group of cells (G, 6) was, or None."""
+    place, sensor = group[:, :2].mean(axis=0), group[:, 2:4].mean(axis=0)
+    distance = np.linalg.norm(place - sensor)
+    sight = (place - sensor) / distance
+    width = np.ptp(group[:, :2] @ [-sight[1], sight[0]]) + step * distance
+    begin, end = group[:, 4].min(), np.median(group[:, 5])
+    for rows in pieces:
+        first = t[int(rows[0, 0])]
+        if abs(first - end) < BEGAN and np.linalg.norm(rows[0, 1:3] - place) < ALONE:
+            end = min(end, first - 1e-9)
+    scans = np.flatnonzero((t >= begin) & (t <= end))
+    if width > WIDE or len(scans) < 3:
+        return None
+    row = np.array([0.0, *place, *sight, min(width, WIDEST), SURE, 0.0])
+    rows = np.tile(row, (len(scans), 1))
+    rows[:, 0] = scans
+    return rows
+
+
+def off_standing(pieces, places, since, t):
+    """Pieces without the measurements at their beginning that are of something that still stands.
+
+    Parameters
+    ----------
+    pieces : list of (n, 8) float arrays
+    places : (S, 2) float array
+        Cells that stand, in m.
+    since : (S,) float array
+        Since when, in s.
+    t : (T,) float array
+        Time of each scan in s.
+
+    Returns
+    -------
+    list of (n, 8) float arrays
+    """
+    if not len(places):
+        return pieces
+    tree, kept = scipy.spatial.cKDTree(places), []
+    for rows in pieces:
+        away, cell = tree.query(rows[:, 1:3])
+        on = (away < ON) & (since[cell] <= t[rows[:, 0].astype(int)] + 0.1)
+        first = len(rows) if on.all() else int(np.argmin(on))
+        if len(rows) - first >= 3:
+            kept.append(rows[first:])
+    return kept
 
 
 # ---- pieces of one person's way
@@ -260,7 +361,7 @@ class Person:
 
     Attributes
     ----------
-    rows : (n, 7) float array
+    rows : (n, 8) float array
         Measurements, see `Followed.pieces`.
     gaps : (G, 2) float array
         When each bridged gap begins and ends, in s.
@@ -287,7 +388,7 @@ def joined(pieces, t, area, way=None, motion=None):
 
     Parameters
     ----------
-    pieces : list of (n, 7) float arrays
+    pieces : list of (n, 8) float arrays
         From `Followed.pieces`.
     t : (T,) float array
         Time of each scan in s.
@@ -455,33 +556,137 @@ def person_of(person, t, motion=None):
     lived = t[scans[0] : scans[-1] + 1]
     seen = scans - scans[0]
 
-    def smoothed(middles):
-        measurements, sd = np.full((len(lived), 2), np.nan), np.full(len(lived), SURE)
-        measurements[seen], sd[seen] = middles, rows[:, 6]
-        return measurements, *smooth(lived, measurements, motion, sd)
+    def smoothed(middles, sd):
+        measurements, sds = np.full((len(lived), 2), np.nan), np.full(len(lived), SURE)
+        measurements[seen], sds[seen] = middles, sd
+        return measurements, *smooth_in_sight(lived, measurements, motion, sds)
 
-    _, _, velocities = smoothed(middles_of(rows))
-    behind = half_depth(rows, velocities[seen])
-    measurements, positions, velocities = smoothed(middles_of(rows, behind))
+    _, _, velocities = smoothed(middles_of(rows), rows[:, 6])
+    measurements, positions, velocities = smoothed(*fitted_middles(rows, velocities[seen]))
     return Track(lived, positions, velocities, np.isnan(measurements[:, 0]), measurements)
 
 
-def half_depth(rows, velocities):
-    """(n,) half of the depth in m behind each near side, from the widths of all."""
+def smooth_in_sight(t, measurements, motion, sd):
+    """Positions and velocities (N, 2): smoothed while in sight, and between as `bridge` has it."""
+    seen = np.flatnonzero(np.isfinite(measurements[:, 0]))
+    parts = np.split(seen, np.flatnonzero(np.diff(t[seen]) > BRIDGED) + 1)
+    parts = [surely(part, t, sd, k > 0, k + 1 < len(parts)) for k, part in enumerate(parts)]
+    positions, velocities = np.empty((2, len(t), 2))
+    for part in parts:
+        lived = slice(part[0], part[-1] + 1)
+        positions[lived], velocities[lived] = smooth(t[lived], measurements[lived], motion, sd[lived])
+    for before, after in zip(parts[:-1], parts[1:], strict=True):
+        ends, hidden = [before[-1], after[0]], slice(before[-1] + 1, after[0])
+        positions[hidden], velocities[hidden] = bridge(t[ends], positions[ends], velocities[ends], t[hidden])
+    return positions, velocities
+
+
+def surely(part, t, sd, first, last):
+    """A stretch in sight (n,) without what is vague at its first or last moments, if much is left."""
+    good = part[sd[part] < VAGUE]
+    if not len(good) or t[good[-1]] - t[good[0]] < BRIDGED:
+        return part
+    begin, end = good[0] if first else part[0], good[-1] if last else part[-1]
+    return part[(part >= begin) & (part <= end)]
+
+
+BRIDGED = 0.5
+"""s out of sight from which on what is between is a bridge."""
+
+
+def bridge(t, places, velocities, when):
+    """The way of somebody out of sight, who goes on as fast as before.
+
+    A cubic curve that leaves one place and reaches the other in the directions seen there, and
+    swings out so far that its length is what somebody walks in the time.
+
+    Parameters
+    ----------
+    t : (2,) float array
+        When they were seen last and again, s.
+    places, velocities : (2, 2) float arrays
+        There and then, m and m/s.
+    when : (M,) float array
+        Times between, s.
+
+    Returns
+    -------
+    positions, velocities : (M, 2) float arrays
+        m and m/s.
+
+    Examples
+    --------
+    Who goes behind a box and comes back on the other side of it has walked round it:
+
+    >>> back = bridge(np.array([0.0, 3.0]), np.array([[0.0, 0.0], [0.0, 0.5]]), np.array([[1.0, 0], [-1.0, 0]]), [1.5])
+    >>> back[0].round(1)
+    array([[1.3, 0.2]])
+    """
+    seconds, chord = t[1] - t[0], places[1] - places[0]
+    speeds = np.hypot(*velocities.T)
+    length = max(speeds.mean() * seconds, np.hypot(*chord))
+    slow = speeds < SLOW
+    if slow.any():  # who stands has no direction
+        directions = np.where(slow[:, None], chord / max(np.hypot(*chord), 1e-9), velocities)
+        length = np.hypot(*chord)
+    else:
+        directions = velocities
+    directions = directions / np.maximum(np.hypot(*directions.T), 1e-9)[:, None]
+    share = np.linspace(0, 1, 101)[:, None]
+
+    def curve(swing):
+        first, last = swing * length * directions
+        leave, reach = share * (1 - share) ** 2 * first, share**2 * (share - 1) * last
+        return places[0] + (3 - 2 * share) * share**2 * chord + leave + reach
+
+    low, high = 0.0, MOST_SWING
+    for _ in range(20):
+        middle = (low + high) / 2
+        low, high = (middle, high) if arc_length(curve(middle))[-1] < length else (low, middle)
+    points = curve(low)
+    walked = arc_length(points)
+    along = (np.asarray(when) - t[0]) / seconds * walked[-1]
+    positions = at_arc_length(points, along)
+    ahead = at_arc_length(points, along + 0.01) - at_arc_length(points, along - 0.01)
+    ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    return positions, walked[-1] / seconds * ahead
+
+
+SLOW, MOST_SWING = 0.2, 4.0
+"""m/s below which somebody stands; and by how much more than on a straight way a bridge may swing out."""
+
+
+def fitted_middles(rows, velocities):
+    """Middles (n, 2) in m of one body in all scans, and their standard deviations (n,) in m."""
+    across, depth = half_axes(rows, velocities)
+    width, side = rows[:, 5] / 2, rows[:, 7]
+    body = width >= NARROW / 2
+    cut = (np.abs(side) == 1) & (across > width) & (np.median(rows[:, 5]) >= NARROW)
+    # What is in sight of a disc, from its edge inwards, lies so deep before its middle on average.
+    inner = np.clip(1 - 2 * width / across, -1, 1)
+    arc = (pi / 2 - np.arcsin(inner) - inner * np.sqrt(1 - inner**2)) / (2 * (1 - inner).clip(1e-6))
+    behind = np.where(cut, arc * depth, np.where(body, pi / 4 * depth, pi / 4 * width))
+    aside = np.where(cut, side * (across - width), 0.0)[:, None] * np.column_stack([-rows[:, 4], rows[:, 3]])
+    middles = rows[:, 1:3] + behind[:, None] * rows[:, 3:5] + aside
+    return middles, np.where(cut, (SURE + rows[:, 6]) / 2, rows[:, 6])
+
+
+def half_axes(rows, velocities):
+    """(n,) half of the width across the sight, and of the depth along it, from the widths of all."""
     speed = np.maximum(np.hypot(*velocities.T), 1e-9)
     along = ((velocities * rows[:, 3:5]).sum(axis=1) / speed) ** 2  # cos^2 phi
-    whole = (rows[:, 5] >= NARROW) & (rows[:, 6] < VAGUE)
+    whole = (rows[:, 5] >= NARROW) & (rows[:, 7] == 0)
     if not whole.any():
-        return rows[:, 5] / 2
+        return rows[:, 5] / 2, rows[:, 5] / 2
     square = (rows[whole, 5] / 2) ** 2
     typical = np.median(square)
     moving = speed[whole] > 0.3
     forms = np.column_stack([along[whole], 1 - along[whole]])[moving]
     pull = 10.0  # as many widths of a round body
     a2, b2 = np.linalg.solve(forms.T @ forms + pull * np.eye(2), forms.T @ square[moving] + pull * typical)
-    mean = (a2 + b2) / 2
-    depth = np.where(speed > 0.3, a2 * (1 - along) + b2 * along, mean)
-    return np.sqrt(np.clip(depth, 0.05**2, (WIDEST / 2) ** 2))
+    along = np.where(speed > 0.3, along, 0.5)
+    depth, across = a2 * (1 - along) + b2 * along, a2 * along + b2 * (1 - along)
+    return tuple(np.sqrt(np.clip(each, 0.05**2, (WIDEST / 2) ** 2)) for each in (across, depth))
 
 
 def moving_speed(track):
