@@ -599,6 +599,13 @@ class SeenFloor:
         cells, _ = flat_cells(np.column_stack([x, y]), self.origin, self.resolution, self.shape)
         self.first[cells] = np.minimum(self.first[cells], t)
 
+    def first_at(self, places):
+        """When, in s, each place (M, 2) was seen first, (M,); `inf` where it never was."""
+        found = np.full(len(places), np.inf)
+        cells, inside = flat_cells(places, self.origin, self.resolution, self.shape)
+        found[inside] = self.first[cells]
+        return found
+
     def grid(self):
         """(H, W) bool array: seen by now, gaps between beams closed."""
         return scipy.ndimage.binary_closing(np.isfinite(self.first).reshape(self.shape), np.ones((3, 3)))

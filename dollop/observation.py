@@ -17,7 +17,7 @@ from dollop.foreground import (
     surface_points,
 )
 from dollop.gridmap import flat_cells, in_cells
-from dollop.people import Followed, candidates, joined, moving_speed, off_standing, person_of, stood
+from dollop.people import Followed, candidates, joined, moving_speed, off_standing, person_of, stood, together
 from dollop.tracking import Motion, Track, Tracker, identify_user, track_objects, user_track
 from dollop.trajectory import arc_length
 
@@ -243,7 +243,7 @@ class Observer:
         cells, rows = self.standing, self.standing.standing
         pieces = off_standing(self.followed.pieces(), cells.places[rows], cells.since[rows], t)
         gone = np.array(list(cells.gone.values())).reshape(-1, 6)
-        standing, _ = stood(gone, pieces, t, self.step_angle)
+        standing = stood(gone, pieces, t, self.step_angle)
         pieces = sorted(standing + pieces, key=lambda each: each[0, 0])
         persons = joined(pieces, t, area, self.background.way_length, self.motion)
         tracks = [person_of(each, t, self.motion) for each in persons]
@@ -252,8 +252,8 @@ class Observer:
         chosen = choose(people, self.user)
         user = None if chosen is None else people[chosen]
         who = None if chosen is None else persons[walked[chosen]]
-        environment, told = self._environment(people)
-        notes = (*notes, *told, *self._map_notes())
+        environment, groups = self._environment(people, user)
+        notes = (*notes, *self._map_notes(), *self._object_notes(environment, groups, gone, people))
         if user is not None:
             notes += tuple(user_notes(user, who, people, self.user, self.background))
         losses = 0 if who is None else len(who.gaps)
@@ -272,19 +272,86 @@ class Observer:
             text = f"{share:.0%} of the readings are on nothing that the map knows (at most {MOST_FOREGROUND:.0%})"
             yield Note("map", f"{text}: it does not fit the poses, or the room has changed")
 
-    def _environment(self, people):
-        """The objects that stand at the end, and what is to be noted of them."""
+    def _environment(self, people, user):
+        """The objects that stand at the end, and the cells of each."""
         cells, rows, now = self.standing, self.standing.standing, self.followed.t[-1]
         for track in people:
-            if track.t[-1] > now - 1.0:
+            since = arrival(track)
+            if track.t[-1] > now - 1.0 and (track is user or now - since < LINGERS):
                 there = np.linalg.norm(cells.places[rows] - track.positions[-1], axis=1) < STANDING_REACH
-                arrived = track.t[np.linalg.norm(track.positions - track.positions[-1], axis=1) > 0.5]
-                since = arrived[-1] if len(arrived) else -np.inf
                 rows = rows[~(there & (cells.since[rows] >= since - 0.5))]
-        places, sensors = cells.places[rows], cells.sensors[rows]
-        boxes, assumed, hidden, _ = standing_boxes(places, sensors, self.step_angle, self._scan, self.min_area)
+        boxes, assumed, hidden, groups = standing_boxes(
+            cells.places[rows], cells.sensors[rows], self.step_angle, self._scan, self.min_area
+        )
         seen = Seen(self.floor.grid(), self.floor.origin, self.floor.resolution)
-        return Environment(boxes, seen, assumed), []
+        return Environment(boxes, seen, assumed), [rows[each] for each in groups]
+
+    def _object_notes(self, environment, groups, gone, people):
+        """What came, went or moved meanwhile, and what was seen too shortly or in part."""
+        begin, now = self.followed.t[0], self.followed.t[-1]
+        if now - begin < SHORTEST_LOOK:
+            text = f"the scans last {now - begin:.1f} s: what stands is known after {SHORTEST_LOOK:g} s"
+            yield Note("short look", text)
+        came = {k: when for k, rows in enumerate(groups) if (when := self._came(rows)) > begin + SHORTEST_LOOK}
+        for place, box, when in went(gone, people, self.min_area):
+            near = [k for k in came if abs(came[k] - when) < MOVED_WITHIN]
+            to = min(near, key=lambda k: unlike(environment.boxes[k], box), default=None)
+            what = f"an object at ({place[0]:.2f}, {place[1]:.2f})"
+            if to is None:
+                yield Note("object went", f"{what} was gone after {when - begin:.1f} s")
+            else:
+                x, y = environment.centres[to]
+                yield Note("object moved", f"{what} was moved to ({x:.2f}, {y:.2f}) {when - begin:.1f} s after the start")
+                del came[to]
+        for k, when in came.items():
+            x, y = environment.centres[k]
+            yield Note("object came", f"an object stands at ({x:.2f}, {y:.2f}) since {when - begin:.1f} s after the start")
+
+    def _came(self, rows):
+        """Since when an object stands whose place had been seen free before; else the beginning."""
+        since = float(np.median(self.standing.since[rows]))
+        free = self.floor.first_at(self.standing.places[rows])
+        return since if np.median(free) < since - 0.5 else self.followed.t[0]
+
+
+LINGERS = 3.0
+"""s after which somebody who stands, and is not the user, counts as an object."""
+SHORTEST_LOOK = 1.5
+"""s of scans that it takes to know what stands."""
+MOVED_WITHIN = 5.0
+"""s between the end of an object here and its beginning there for it to be the same."""
+
+
+def arrival(track):
+    """When, in s, somebody came to where they stand at the end; -inf if they have always been there."""
+    away = track.t[np.linalg.norm(track.positions - track.positions[-1], axis=1) > 0.5]
+    return float(away[-1]) if len(away) else -np.inf
+
+
+def went(gone, people, min_area):
+    """Objects that stood and went: place (2,) in m, box (4,) in m, and when in s each was last seen."""
+    found = []
+    for group in together(gone):
+        low, high = group[:, :2].min(axis=0), group[:, :2].max(axis=0)
+        begin, end = group[:, 4].min(), float(np.median(group[:, 5]))
+        wide = max(high - low)
+        if end - begin < SHORTEST_LOOK or len(group) < 3 or wide**2 < min_area:
+            continue
+        place = (low + high) / 2
+        if not any(was_there(track, place, begin, end) for track in people):
+            found.append((place, np.concatenate([low, high]), end))
+    return found
+
+
+def was_there(track, place, begin, end):
+    """Whether somebody stood at a place at the end of a time."""
+    when = (track.t > max(begin, end - 2.0)) & (track.t < end + 0.5)
+    return bool(when.any() and (np.linalg.norm(track.positions[when] - place, axis=1) < STANDING_REACH).any())
+
+
+def unlike(box, other):
+    """By how much two boxes (4,) differ in size, m."""
+    return float(np.abs((box[2:] - box[:2]).max() - (other[2:] - other[:2]).max()))
 
 
 STANDING_REACH = 0.5

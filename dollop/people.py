@@ -30,7 +30,7 @@ import scipy
 from dollop.tracking import Motion, Track, smooth
 from dollop.trajectory import arc_length, at_arc_length
 
-__all__ = ["Followed", "Person", "candidates", "joined", "moving_speed", "off_standing", "person_of", "stood"]
+__all__ = ["Followed", "Person", "candidates", "joined", "moving_speed", "off_standing", "person_of", "stood", "together"]
 
 JUMP, SPREAD = 0.12, 1.5
 """Neighbouring readings farther apart than `JUMP` m plus `SPREAD` beam spacings are different surfaces."""
@@ -249,7 +249,7 @@ ON = 0.20
 
 
 def stood(gone, pieces, t, step):
-    """Pieces of those who stood before they walked, and what else stood and went.
+    """Pieces of those who stood before they walked.
 
     Parameters
     ----------
@@ -266,26 +266,31 @@ def stood(gone, pieces, t, step):
     -------
     list of (n, 8) float arrays
         One for each thing that a person may be.
-    groups : list of (G_k, 6) float arrays
-        All that went, those first that may be people.
     """
+    groups = (group for group in together(gone) if not followed_there(group, pieces, t))
+    return [rows for group in groups if (rows := standing_rows(group, pieces, t, step)) is not None]
+
+
+def together(gone):
+    """Cells (G, 6) that stood and went together, a list of arrays."""
     if not len(gone):
-        return [], []
+        return []
     pairs = scipy.spatial.cKDTree(gone[:, :2]).query_pairs(STOOD_LINK, output_type="ndarray")
-    together = np.minimum(*gone[pairs, 5].T) > np.maximum(*gone[pairs, 4].T) if len(pairs) else np.zeros(0, bool)
-    i, j = pairs[together].T if len(pairs) else (np.zeros(0, int),) * 2
-    graph = scipy.sparse.coo_matrix((np.ones(len(i)), (i, j)), (len(gone),) * 2)
-    _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    found, things, others = [], [], []
-    for k in np.unique(label):
-        group = gone[label == k]
-        rows = standing_rows(group, pieces, t, step)
-        if rows is None:
-            others.append(group)
-        else:
-            found.append(rows)
-            things.append(group)
-    return found, things + others
+    pairs = pairs[np.minimum(*gone[pairs, 5].T) > np.maximum(*gone[pairs, 4].T)]
+    graph = scipy.sparse.coo_matrix((np.ones(len(pairs)), tuple(pairs.T)), (len(gone),) * 2)
+    count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    return [gone[label == k] for k in range(count)]
+
+
+def followed_there(group, pieces, t):
+    """Whether a piece was where a group of cells (G, 6) stood for most of that time."""
+    begin, end = group[:, 4].min(), np.median(group[:, 5])
+    for rows in pieces:
+        when = t[rows[:, 0].astype(int)]
+        there = (when >= begin) & (when <= end) & (np.linalg.norm(rows[:, 1:3] - group[:, :2].mean(axis=0), axis=1) < ALONE)
+        if there.any() and np.ptp(when[there]) > 0.7 * (end - begin):
+            return True
+    return False
 
 
 def standing_rows(group, pieces, t, step):
@@ -663,7 +668,7 @@ def fitted_middles(rows, velocities):
     body = width >= NARROW / 2
     cut = (np.abs(side) == 1) & (across > width) & (np.median(rows[:, 5]) >= NARROW)
     # What is in sight of a disc, from its edge inwards, lies so deep before its middle on average.
-    inner = np.clip(1 - 2 * width / across, -1, 1)
+    inner = np.clip(1 - 2 * width / np.maximum(across, 1e-3), -1, 1)
     arc = (pi / 2 - np.arcsin(inner) - inner * np.sqrt(1 - inner**2)) / (2 * (1 - inner).clip(1e-6))
     behind = np.where(cut, arc * depth, np.where(body, pi / 4 * depth, pi / 4 * width))
     aside = np.where(cut, side * (across - width), 0.0)[:, None] * np.column_stack([-rows[:, 4], rows[:, 3]])
