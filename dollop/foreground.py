@@ -592,7 +592,7 @@ class SeenFloor:
         self.last = t
         back = np.isfinite(ranges) & (ranges < farthest)
         bearings, reach = pose[2] + angles[back], ranges[back]
-        steps = (reach / self.resolution).astype(int) + 1
+        steps = ((reach - BEYOND) / self.resolution).astype(int).clip(0) + 1
         along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
         x = pose[0] + np.repeat(np.cos(bearings), steps) * along * self.resolution
         y = pose[1] + np.repeat(np.sin(bearings), steps) * along * self.resolution

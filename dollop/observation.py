@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from dollop.checks import Note, check_choice, check_positive, checked_array, trusted
 from dollop.environment import Environment, Seen, standing_boxes
@@ -277,7 +278,7 @@ class Observer:
         cells, rows, now = self.standing, self.standing.standing, self.followed.t[-1]
         for track in people:
             since = arrival(track)
-            if track.t[-1] > now - 1.0 and (track is user or now - since < LINGERS):
+            if track.t[-1] > now - 1.0 and (track is user or not slides(track)):
                 there = np.linalg.norm(cells.places[rows] - track.positions[-1], axis=1) < STANDING_REACH
                 rows = rows[~(there & (cells.since[rows] >= since - 0.5))]
         boxes, assumed, hidden, groups = standing_boxes(
@@ -292,8 +293,9 @@ class Observer:
         if now - begin < SHORTEST_LOOK:
             text = f"the scans last {now - begin:.1f} s: what stands is known after {SHORTEST_LOOK:g} s"
             yield Note("short look", text)
-        came = {k: when for k, rows in enumerate(groups) if (when := self._came(rows)) > begin + SHORTEST_LOOK}
-        for place, box, when in went(gone, people, self.min_area):
+        stands = self.standing.places[self.standing.standing]
+        came = {k: when for k, rows in enumerate(groups) if (when := self._came(rows, gone)) > begin + SHORTEST_LOOK}
+        for place, box, when in went(gone, stands, people, self.min_area):
             near = [k for k in came if abs(came[k] - when) < MOVED_WITHIN]
             to = min(near, key=lambda k: unlike(environment.boxes[k], box), default=None)
             what = f"an object at ({place[0]:.2f}, {place[1]:.2f})"
@@ -307,15 +309,19 @@ class Observer:
             x, y = environment.centres[k]
             yield Note("object came", f"an object stands at ({x:.2f}, {y:.2f}) since {when - begin:.1f} s after the start")
 
-    def _came(self, rows):
+    def _came(self, rows, gone):
         """Since when an object stands whose place had been seen free before; else the beginning."""
-        since = float(np.median(self.standing.since[rows]))
-        free = self.floor.first_at(self.standing.places[rows])
-        return since if np.median(free) < since - 0.5 else self.followed.t[0]
+        places, since = self.standing.places[rows], np.quantile(self.standing.since[rows], 0.1)
+        before = nearest(gone[:, :2], places) < SAME_PLACE
+        if np.median(self.floor.first_at(places)) < since - 0.5 and not (gone[before, 4] < since - 0.5).any():
+            return float(since)
+        return self.followed.t[0]
 
 
-LINGERS = 3.0
-"""s after which somebody who stands, and is not the user, counts as an object."""
+SAME_PLACE = 0.25
+"""m: what went and what stands there so near are the same, seen badly."""
+SLIDES = 0.6
+"""m/s up to which who stood before and stands afterwards may be an object that was moved."""
 SHORTEST_LOOK = 1.5
 """s of scans that it takes to know what stands."""
 MOVED_WITHIN = 5.0
@@ -328,7 +334,21 @@ def arrival(track):
     return float(away[-1]) if len(away) else -np.inf
 
 
-def went(gone, people, min_area):
+def slides(track):
+    """Whether somebody may be an object that is moved: stands, is slow, and stands again."""
+    still = track.speeds < 0.15
+    at_ends = still[track.t < track.t[0] + 1.0].mean() > 0.5 and still[track.t > track.t[-1] - 1.0].mean() > 0.5
+    return bool(at_ends and moving_speed(track) < SLIDES)
+
+
+def nearest(points, others):
+    """(M,) distance in m of each point (M, 2) to the nearest of others (L, 2), `inf` if there is none."""
+    if not len(others):
+        return np.full(len(points), np.inf)
+    return scipy.spatial.cKDTree(others).query(points)[0].reshape(-1)
+
+
+def went(gone, stands, people, min_area):
     """Objects that stood and went: place (2,) in m, box (4,) in m, and when in s each was last seen."""
     found = []
     for group in together(gone):
@@ -336,6 +356,8 @@ def went(gone, people, min_area):
         begin, end = group[:, 4].min(), float(np.median(group[:, 5]))
         wide = max(high - low)
         if end - begin < SHORTEST_LOOK or len(group) < 3 or wide**2 < min_area:
+            continue
+        if (nearest(group[:, :2], stands) < SAME_PLACE).mean() > 0.3:
             continue
         place = (low + high) / 2
         if not any(was_there(track, place, begin, end) for track in people):

@@ -45,6 +45,8 @@ SURE, VAGUE = 0.05, 0.14
 half hidden."""
 GATE, GATE_MIN, GATE_MAX = 3.0, 0.45, 1.0
 """Standard deviations, and bounds in m, within which a candidate is taken for who was expected."""
+AT_ONCE, FASTEST = 0.35, 3.0
+"""m, and m/s: nobody is farther from where they were seen last; more is another one who was hidden."""
 PATIENCE = 0.6
 """s out of sight after which a piece ends: what comes then is for `joined` to say."""
 ALONE = 0.65
@@ -52,6 +54,10 @@ ALONE = 0.65
 MOVED, STANDS_WITHIN = 0.5, 0.5
 """m from where it began, from which on a piece is of somebody who walks; and m within which who
 walked is standing."""
+CREEPS = 0.1
+"""m/s up to which a piece is of something that flickers, not of somebody who walks."""
+OFTEN = 0.4
+"""Share of the scans in which somebody is seen who is in sight."""
 ROW = 8
 """Numbers kept of a measurement: scan, x, y of the near side, sight (2), width, standard deviation,
 and the side that something nearer hides: 1 left, -1 right, 2 both, 0 none."""
@@ -127,13 +133,13 @@ class Piece:
     Both axes share one covariance, P = [[pxx, pxv], [pxv, pvv]].
     """
 
-    __slots__ = "x y vx vy pxx pxv pvv seen rows begin far anchor arrived".split()
+    __slots__ = "x y vx vy pxx pxv pvv seen rows born begin far anchor arrived".split()
 
     def __init__(self, place, t):
         self.x, self.y, self.vx, self.vy = *place, 0.0, 0.0
         self.pxx, self.pxv, self.pvv = SURE**2, 0.0, 1.0
         self.seen, self.rows, self.far = t, array("d"), 0.0
-        self.begin, self.anchor, self.arrived = place, place, t
+        self.begin, self.anchor, self.born, self.arrived = place, place, t, t
 
     def predict(self, dt, q):
         """x <- F x, P <- F P F^T + Q over a time in s, for a noise of density q in m^2/s^3."""
@@ -206,7 +212,9 @@ class Followed:
         for k, piece in enumerate(self.alive):
             for m, (x, y) in enumerate(middles):
                 variance = piece.pxx + found[m][5] ** 2
-                gate = min(max(GATE * sqrt(variance), GATE_MIN), GATE_MAX)
+                widest = GATE_MAX if piece.far > MOVED else GATE_MIN
+                widest = min(widest, AT_ONCE + FASTEST * (t - piece.seen))
+                gate = min(max(GATE * sqrt(variance), GATE_MIN), widest)
                 apart = hypot(x - piece.x, y - piece.y)
                 if apart < gate:
                     pairs.append((apart / gate, k, m))
@@ -234,8 +242,10 @@ class Followed:
 
 
 def worth_keeping(piece):
-    """Whether a piece may be of somebody's way: seen three times, and not all in one place."""
-    return len(piece.rows) >= 3 * ROW and piece.far > 0.25
+    """Whether a piece may be of somebody's way: seen often enough, and not all in one place."""
+    n, scans = len(piece.rows) // ROW, piece.rows[-ROW] - piece.rows[0] + 1
+    on_the_way = piece.far > 0.25 + CREEPS * (piece.seen - piece.born)
+    return n >= 4 and n >= OFTEN * scans and (piece.far > MOVED or on_the_way)
 
 
 # ---- what stood, and who walked from there
@@ -353,6 +363,8 @@ DOUBTFUL = 2.0
 """Log odds over the next best assignment below which a joint is not made."""
 END = np.array([[0.08**2, 0.0], [0.0, 0.25**2]])
 """Covariance, m and m/s, of where and how fast somebody was at the end of a piece."""
+TURNS, ABRUPT = 0.1, 10.0
+"""Share of the joints at which somebody turns sharply, and how much more noise that is."""
 CLOSE, BESIDE = 0.8, 0.6
 """m from somebody out of sight within which another may be taken for them; and within which both
 may be one candidate."""
@@ -449,14 +461,20 @@ def log_odds(last, first, area, way, motion):
     if not 0 < gap <= LONGEST_GAP or hypot(*offset) > reach:
         return 0.0
     F, Q = motion.transition(gap)
-    S = Q + F @ END @ F.T + END
     error = np.array([offset - gap * last[2], first[2] - last[2]])
-    fit = -0.5 * np.sum(error * np.linalg.solve(S, error)) - log(np.linalg.det(S)) - 2 * log(2 * pi)
+    steady, abrupt = (normal(error, more * Q + F @ END @ F.T + END) for more in (1.0, ABRUPT))
+    fit = np.logaddexp(log(1 - TURNS) + steady, log(TURNS) + abrupt)
     anew = -log(area) - 0.5 * np.sum(first[2] ** 2) - log(2 * pi)
     odds = fit - anew + PRIOR
     if odds <= 0 or (way is not None and way(last[1], first[1]) > reach):
         return 0.0
     return float(odds)
+
+
+def normal(error, covariance):
+    """Log density of an error (2, 2) of place and velocity whose axes share a covariance (2, 2)."""
+    fit = np.sum(error * np.linalg.solve(covariance, error))
+    return -0.5 * fit - log(np.linalg.det(covariance)) - 2 * log(2 * pi)
 
 
 def best_assignment(odds):

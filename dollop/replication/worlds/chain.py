@@ -98,7 +98,7 @@ class Judgement:
         self.doubts += [str(each.message) for each in caught if issubclass(each.category, UserWarning)]
         for result in results.values():
             for each in result if isinstance(result, list) else [result]:
-                self.doubts += [str(getattr(note, "text", note)) for note in getattr(each, "notes", ())]
+                self.doubts += [str(note) for note in getattr(each, "notes", ()) if note.doubt]
 
     @property
     def outcome(self):
