@@ -10,13 +10,15 @@ import numpy as np
 import dollop
 from dollop.formats.files import check_writable, whole_file
 from dollop.gridmap import check_is_map
+from dollop.people import moving_speed
 from dollop.trajectory import arc_length
 
 __all__ = ["in_one_line", "main", "replication"]
 
-LEG_HEIGHT = "at leg height a walker is two small blobs: try --min-area 0.0025 --stride 0.6"
 STOPPED = 130
 """Exit status of a command that was interrupted: 128 and the number of the signal."""
+IN_DOUBT = 3
+"""Exit status of a command that is done, with notes that put its result in doubt."""
 
 
 def main(arguments=None):
@@ -89,8 +91,9 @@ def _parser():
     add("--resolution", type=float, default=0.05, help="m per cell (default: 0.05)")
     add = command(_observe, "observe", "track the user in a laser log", log)
     add("map", help="background map: .yaml (ROS map_server) or .map (CARMEN)")
+    add("--user", type=_user, default="fastest", metavar="WHO", help="fastest (default), a place X,Y or a number")
+    add("--tracks", metavar="FILE", help="everybody's trajectories, a .csv")
     add("--min-area", type=float, default=0.01, help="smallest foreground object in m^2 (default: 0.01)")
-    add("--stride", type=float, default=0.0, help="blobs nearer than this in m are one (default: 0)")
     add("--out", default="user.csv", help="the trajectory (default: user.csv); a .png lands beside it")
     add = command(_data, "data", "remake the recordings that the notebooks read")
     add("--folder", type=Path, default=Path("data"), help="where to write (default: data)")
@@ -140,43 +143,90 @@ def _map(options):
     print(f"wrote {options.map}")
 
 
+def _user(text):
+    """Who the user is, as `dollop.observe` takes it: fastest, a place X,Y, or a number."""
+    if text == "fastest":
+        return text
+    if "," in text:
+        return tuple(float(part) for part in text.split(","))
+    return int(text)
+
+
 def _observe(options):
     """dollop observe LOG MAP"""
     out, picture = _outputs(options)
     log = dollop.read_log(options.log, options.topic)
     background = dollop.OccupancyGrid.load(options.map)
-    found = dollop.observe(log, background, min_area=options.min_area, stride=options.stride)
+    found = dollop.observe(log, background, options.user, min_area=options.min_area)
     if found.user is None:
-        text = f"nobody moves in {options.log}: there are {len(found.tracks)} tracks, none is fast"
-        raise ValueError(f"{text}; {LEG_HEIGHT}")
+        for note in found.notes:
+            print(note, file=sys.stderr)
+        raise ValueError(f"nobody walks in {options.log}: {len(found.tracks)} tracks are of nobody")
+    written = [out, picture]
     _write_track(found.user, out)
     _draw_observation(found, background, picture)
+    if options.tracks:
+        _write_people(found.people, options.tracks)
+        written.append(options.tracks)
     walked, seconds = arc_length(found.user.positions)[-1], np.ptp(found.user.t)
-    print(f"the user walked {walked:.1f} m in {seconds:.1f} s, lost {found.losses} times;")
-    print(f"{len(found.environment)} static objects; wrote {out} and {picture}")
+    hidden = f"out of sight for {found.user.occluded.mean():.0%}"
+    print(f"the user walked {walked:.1f} m in {seconds:.1f} s, {hidden}; {len(found.environment)} static objects")
+    _tell(found, log.t[0])
+    print(f"wrote {', '.join(map(str, written))}")
+    if not found.trusted:
+        sys.exit(IN_DOUBT)
 
 
 def _outputs(options):
     """Paths of the trajectory and its picture, if both can be written and cover no input."""
     out = Path(options.out)
+    tracks = [Path(options.tracks)] if options.tracks else []
+    if any(path.suffix != ".csv" or path == out for path in tracks):
+        raise ValueError(f"--tracks must be named .csv, and not as --out, got {options.tracks}")
     if out.suffix != ".csv":
         raise ValueError(f"--out must be named .csv (its picture, .png, lands beside it), got {out}")
     if out.with_suffix("").resolve() == Path(options.map).with_suffix("").resolve():
         raise ValueError(f"--out must have another name than the map, whose picture it may replace, got {out}")
-    for path in (out, out.with_suffix(".png")):
+    for path in (out, out.with_suffix(".png"), *tracks):
         check_writable(path)
     return out, out.with_suffix(".png")
 
 
+def _tell(found, begin):
+    """Notes, and who walked where if there is a choice, on the error stream."""
+    for note in found.notes:
+        print(f"{'doubt' if note.doubt else 'note'}: {note}", file=sys.stderr)
+    if len(found.people) > 1 and any(note.kind == "people" for note in found.notes):
+        print("say who the user is with --user X,Y or --user NUMBER:", file=sys.stderr)
+        for k, who in enumerate(found.people):
+            x, y = who.positions[0]
+            way = f"{arc_length(who.positions)[-1]:.1f} m at {moving_speed(who):.2f} m/s"
+            when = f"{who.t[0] - begin:.1f} to {who.t[-1] - begin:.1f} s"
+            print(f"  {k}: from ({x:.2f}, {y:.2f}), {when}, {way}", file=sys.stderr)
+
+
 def _write_track(user, path):
     """The user's trajectory as a table."""
+    with whole_file(path, "w") as stream:
+        _table(user).to_csv(stream, index=False, float_format="%.4f")
+
+
+def _write_people(people, path):
+    """Everybody's trajectories as a table, by the number of each."""
     import pandas as pd
 
-    table = pd.DataFrame(user.positions, columns=["x", "y"])
-    table.insert(0, "t", user.t)
-    table["occluded"] = user.occluded
+    tables = [_table(who).assign(person=k) for k, who in enumerate(people)]
     with whole_file(path, "w") as stream:
-        table.to_csv(stream, index=False, float_format="%.4f")
+        pd.concat(tables).to_csv(stream, index=False, float_format="%.4f")
+
+
+def _table(track):
+    """A track's times in s, positions in m, and whether it was out of sight."""
+    import pandas as pd
+
+    table = pd.DataFrame(track.positions, columns=["x", "y"])
+    table.insert(0, "t", track.t)
+    return table.assign(occluded=track.occluded)
 
 
 def _draw_observation(found, background, path):
