@@ -38,8 +38,9 @@ GATE_WIDTH = 4.0  # half the gate's width, in median distances between one lap a
 GATE_SLACK = 0.02  # share of a lap over which a direction is taken, and that a last lap may lack
 STRAIGHT = 0.5  # a gate needs a direction: distance made good, as a share of the way walked there
 # ---- what is no lap
+LEAST = 0.6  # share of the way that laps must make up
 ALIKE = 0.12  # two laps of one task lie apart by less than this share of their size, on average,
-MOSTLY, APART = 0.9, 0.2  # and at this share of their places by less than that one
+MOSTLY, APART = 0.95, 0.25  # and at this share of their places by less than that one
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +125,9 @@ def cut_laps(t, positions):
     with the most laps is taken, and among those the one that is passed most narrowly. What is left
     at head and tail is dropped, and told.
 
-    A walk is kept whole unless it holds at least two full laps of the same task: one lap and a half
-    show nothing twice from end to end, and who walked them may mean just that. Laps that lie apart
-    are no laps: two tasks, one after the other, or the turns of a spiral.
+    A walk is kept whole unless at least two full laps of one task are most of the way (60 %): one lap
+    and a half show nothing twice from end to end, and who walked them may mean just that. Laps
+    that lie apart are no laps: two tasks, one after the other, or the turns of a spiral.
 
     Parameters
     ----------
@@ -218,10 +219,11 @@ def lap_cuts(points):
     track, step, doubt = resample(corners, n), walked[-1] / (n - 1), ""
     for lag in islice(lap_lags(track), TRIALS):
         cuts = cuts_at(points, walked, corners, lag * step)
-        fault = why_no_laps(points, cuts, lag * step)
+        fault, after = why_too_few(walked, cuts), f"it seems to repeat itself after {lag * step:.1f} m"
         if not fault:
-            return cuts, ""
-        doubt = doubt or fault
+            unlike = why_unlike(points, walked, cuts)
+            return ([0, len(points) - 1], f"{after}, but {unlike}") if unlike else (cuts, "")
+        doubt = doubt or f"{after}, but {fault}"
     return [0, len(points) - 1], doubt
 
 
@@ -297,8 +299,8 @@ def first_run(beside, run):
 def best_cuts(points, walked, lap, width):
     """Crossings of the gate with the most laps, among those of the most narrowly passed.
 
-    A walk that ends a little before the gate has a last lap as well: if it lacks little of the
-    typical way, or, rather than losing it, if it ends near the gate.
+    A walk that ends a little before the gate has a last lap as well: if it is as long as others, or,
+    rather than none, if it ends near the gate.
     """
     end, walked = len(points) - 1, walked - walked[0]
     best, best_rank = [0, end], (2, True, -np.inf)
@@ -306,9 +308,9 @@ def best_cuts(points, walked, lap, width):
     for gate in gates[:: -(-len(gates) // GATES)]:
         found = gate_crossings(points, walked, gate, lap, width)
         rest = walked[-1] - walked[found[-1]]
+        near = np.linalg.norm(points[end] - points[gate]) <= max(width, GATE_SLACK * lap)
         full = (1 - GATE_SLACK) * lap <= rest < lap
-        back = np.linalg.norm(points[end] - points[gate]) <= max(width, GATE_SLACK * lap)
-        nearly = not full and back and abs(rest - lap) < LAP_SPREAD * lap
+        nearly = not full and near and abs(rest - lap) < LAP_SPREAD * lap
         found = [*found, end] if full or nearly else found
         narrow = -np.linalg.norm(points[found] - points[gate], axis=1).max()
         rank = len(found), not nearly, narrow
@@ -355,20 +357,33 @@ def gate_crossings(points, walked, gate, lap, width):
         found.append(int(crossing[one + np.argmin(aside[crossing[one:beyond]])]))
 
 
-def why_no_laps(points, cuts, lap):
-    """Why the walk between cuts is not to be taken for laps of one task, "" if it may be."""
-    after = f"it seems to repeat itself after {lap:.1f} m"
+def why_too_few(walked, cuts):
+    """Why the laps between cuts are too few to be what the walk is about, "" if they are not."""
+    share = (walked[cuts[-1]] - walked[cuts[0]]) / walked[-1]
     if len(cuts) < 3:
-        return f"{after}, but holds less than two full laps"
-    first, *others = [resample(points[start : end + 1], LAP_POINTS) for start, end in pairwise(cuts)]
+        return "holds less than two full laps"
+    return "" if share >= LEAST else f"its laps would be {share:.0%} of it, less than {LEAST:.0%}"
+
+
+def why_unlike(points, walked, cuts):
+    """Why the laps between cuts are not to be taken for one task, "" if they may be."""
+    places = [np.linspace(start, end, LAP_POINTS) for start, end in pairwise(walked[cuts])]
+    first, *others = [at_way(points, walked, each) for each in places]
     apart = np.array([distance_between(first, other) for other in others]) / size(first)
     mean, most = apart.mean(axis=1).max(), np.quantile(apart, MOSTLY, axis=1).max()
     if mean < ALIKE and most < APART:
         return ""
-    return f"{after}, but its laps lie {mean:.0%} of their size apart on average and {most:.0%} at a tenth of their places"
+    found = f"{mean:.0%} of their size apart on average, {most:.0%} at a twentieth of their places"
+    return f"its laps lie up to {found}; laps of one task lie {ALIKE:.0%} and {APART:.0%} apart at most"
+
+
+def at_way(points, walked, distance):
+    """Positions (M, 2) of a track (N, 2) after ways (M,) in m, given that to each sample (N,)."""
+    return np.stack([np.interp(distance, walked, column) for column in points.T], axis=1)
 
 
 def distance_between(one, other):
-    """Distance (n,) in m of each place on two walks (n, 2) to the other walk, the farther of the two."""
-    gaps = scipy.spatial.distance.cdist(one, other)
+    """Distance (n,) in m of each place on two laps (n, 2) to the other lap thereabouts, the farther of the two."""
+    gaps, share = scipy.spatial.distance.cdist(one, other), np.linspace(0, 1, len(one))
+    gaps[np.abs(share[:, None] - share) > LAP_SPREAD] = np.inf
     return np.maximum(gaps.min(axis=0), gaps.min(axis=1))
