@@ -68,6 +68,9 @@ class Cut:
     after: float = 0.0
     doubt: str = ""
 
+    def __repr__(self):
+        return f"Cut of {self.way:.1f} m into {len(self.laps)} laps, {self.dropped:.0%} dropped"
+
     @property
     def dropped(self):
         """Share of the way that is in no lap, 0 to 1."""

@@ -169,7 +169,15 @@ def spiral(turns, pitch):
     return ((0.5 + pitch * angle / (2 * np.pi)) * np.stack([np.cos(angle), np.sin(angle)])).T
 
 
+def slalom(side):
+    """Once along a slalom (160, 2) of 6 m, and back beside it; the first cone is passed on a side, 1 or -1."""
+    there, back = np.linspace(-3, 3, 100), np.linspace(3, -3, 60)
+    along = np.stack([there, 0.5 * side * np.sin(np.pi * there / 3)], axis=1)
+    return np.vstack([along, np.stack([back, np.full(60, -1.6)], axis=1)])
+
+
 UNLIKE = {
+    "cones passed on the other side": np.vstack([slalom(1), slalom(1), slalom(-1), slalom(-1)]),
     "two circles": np.vstack([circle(1), circle(1, radius=2.0)]),
     "circles left, then right": np.vstack([circle(2), -circle(2)]),
     "circles, then figure-eights": np.vstack([circle(2, radius=2.0), eight(2, 600)]),
@@ -189,7 +197,7 @@ def test_other_tasks_are_no_laps(track):
 
 def test_a_walk_kept_whole_says_why():
     """Laps that lie apart are named with their distance and the rule."""
-    (note,) = cut_laps(np.arange(1200), np.vstack([circle(1, 600), circle(1, 600, radius=2.0)])).notes
+    (note,) = cut_laps(np.arange(640), UNLIKE["cones passed on the other side"]).notes
     assert note.kind == "laps" and not note.doubt
     assert "kept whole" in note.text and "apart" in note.text and "12%" in note.text
 
