@@ -27,6 +27,8 @@ PATCHY = 10, 100_000  # so many times as many samples may fill gaps of the clock
 REPEATS = 1 / 3  # a lap later it is this much closer to itself than two random places are
 LAP_POINTS = 200  # so many describe a lap, if the track has as many
 PLACES = 1000  # and so many places of the track tell how far apart it is from itself
+GOLDEN = (5**0.5 - 1) / 2  # whose multiples fall evenly and never in step
+FEWEST = 20  # of them that must meet again
 LAG_RATIO = 1.005  # of one lag looked at to the next
 TRIALS = 6  # dips of the distance that are tried
 # ---- where a lap begins
@@ -259,8 +261,12 @@ def lap_lags(track):
 def distances_apart(track, lag):
     """Median distance in m between places a lag apart, and the least mean of it over one lag."""
     stride = max(1, len(track) // PLACES)
-    gaps = np.linalg.norm(track[lag::stride] - track[: len(track) - lag : stride], axis=1)
-    window = min(len(gaps), max(1, lag // stride))
+    # One place of each stride, never at the same point of it: strides may be in step with the laps.
+    strides = np.arange((len(track) - lag) // stride)
+    places = stride * strides + (stride * (GOLDEN * strides % 1)).astype(int)
+    gaps = np.linalg.norm(track[places + lag] - track[places], axis=1)
+    # Few places may meet by chance: of a long walk that makes the window longer than one lag.
+    window = min(len(gaps), max(lag // stride, 1 if stride == 1 else FEWEST))
     sums = np.cumsum(np.append(0, gaps))
     return np.median(gaps), (sums[window:] - sums[:-window]).min() / window
 
@@ -370,7 +376,7 @@ def why_too_few(walked, cuts):
 
 def why_unlike(points, walked, cuts):
     """Why the laps between cuts are not to be taken for one task, "" if they may be."""
-    places = [np.linspace(start, end, LAP_POINTS) for start, end in pairwise(walked[cuts])]
+    places = [np.linspace(start, end, LAP_POINTS // 2) for start, end in pairwise(walked[cuts])]
     first, *others = [at_way(points, walked, each) for each in places]
     apart = np.array([distance_between(first, other) for other in others]) / size(first)
     mean, most = apart.mean(axis=1).max(), np.quantile(apart, MOSTLY, axis=1).max()

@@ -226,9 +226,11 @@ def test_a_short_track_is_one_walk(n):
     assert len(cut.laps) == 1 and len(cut.laps[0]) == n
 
 
-def test_a_long_walk_keeps_all_its_laps():
-    """A hundred laps are a hundred: the length of a lap is found whatever share of the walk it is."""
-    assert len(laps(np.arange(20001), eight(100.2, 20001))) == 100
+@pytest.mark.parametrize("turns", [100, 400])
+def test_a_long_walk_keeps_all_its_laps(turns):
+    """A hundred laps are a hundred: the length of a lap is found however small a share of the walk it is."""
+    for more in (0.2, 0.5):
+        assert len(laps(np.arange(20001), eight(turns + more, 20001))) == turns
 
 
 def test_a_clock_of_gaps_is_refused():
