@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from dollop.cdhmm import SubgoalHMM
 from dollop.checks import check_positive, checked_array
 from dollop.environment import Environment
 from dollop.formats.files import FormatError, read_bytes, whole_file
-from dollop.laps import laps
+from dollop.laps import cut_laps
 from dollop.lds import LDS, Statistics
 from dollop.matching import match_confidently
 from dollop.sequenced_lds import SequencedLDS
@@ -38,6 +38,8 @@ class Demonstration:
         Time between samples of the walk in s; the demonstrated speed depends on it.
     tolerance : float
         Largest mean error of a segment in m, see `SequencedLDS.fit`.
+    notes : tuple of Note
+        What somebody who learns from it must know. They are not saved.
 
     Raises
     ------
@@ -49,6 +51,7 @@ class Demonstration:
     environment: Environment
     sample_period: float = 0.1
     tolerance: float = 0.02
+    notes: tuple = ()
 
     def __post_init__(self):
         check_trajectories(self.trajectory)
@@ -70,7 +73,8 @@ class Demonstration:
         Returns
         -------
         Demonstration
-            Of the user's laps, or of the whole walk if it does not repeat itself.
+            Of the user's laps, or of the whole walk if it holds less than two (see `cut_laps`). It
+            carries the observation's notes, and one more where much of the way is in no lap.
 
         Raises
         ------
@@ -80,7 +84,9 @@ class Demonstration:
         if observation.user is None:
             raise ValueError("a demonstration needs a user, but nobody moved")
         t, positions = observation.user.t, observation.user.positions
-        return cls(laps(t, positions), observation.environment, float(np.median(np.diff(t))), tolerance)
+        cut, period = cut_laps(t, positions), float(np.median(np.diff(t)))
+        notes = (*getattr(observation, "notes", ()), *cut.notes)
+        return cls(cut.laps, observation.environment, period, tolerance, notes)
 
     @cached_property
     def law(self):
@@ -105,6 +111,8 @@ class Task:
         from. It is not saved.
     demonstrations : tuple of Demonstration
         What the task was learned from, so that more can be added.
+    notes : tuple of Note
+        Those of its demonstrations, none twice. They are not saved.
     """
 
     law: SequencedLDS
@@ -112,6 +120,7 @@ class Task:
     association: Association
     model: SubgoalHMM = None
     demonstrations: tuple = ()
+    notes: tuple = ()
 
     def __repr__(self):
         shown, subgoals = len(self.demonstrations), len(self.law.segments)
@@ -152,7 +161,8 @@ class Task:
         """
         law, environment = demonstration.law, demonstration.environment
         association = associate(anchors(law), environment, m=len(environment.corners))
-        return cls(law, environment, association, demonstrations=(demonstration,))
+        shown = (demonstration,)
+        return cls(law, environment, association, demonstrations=shown, notes=notes_of(shown))
 
     def add(self, demonstration, spread=0.15):
         """The task learned from all demonstrations so far and one more (Sec. V).
@@ -367,7 +377,12 @@ def learn(demonstrations, environment=None, spread=0.15):
     members = members_along(model)
     association = tie_to_objects(environment, demonstrations, centres, members)
     law = shared_law(laws, members, association.relocate(environment))
-    return Task(law, environment, association, model, demonstrations)
+    return Task(law, environment, association, model, demonstrations, notes_of(demonstrations))
+
+
+def notes_of(demonstrations):
+    """The notes of all demonstrations in order, none twice, as a tuple."""
+    return tuple(dict.fromkeys(chain.from_iterable(shown.notes for shown in demonstrations)))
 
 
 def mapped_to(environment, demonstration, number):

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from walks import walk_figure_eights
 
-from dollop.laps import laps
+from dollop.laps import DROPPED, cut_laps, laps
 from dollop.trajectory import arc_length
 
 
@@ -105,3 +105,138 @@ def test_a_clock_that_runs_backwards():
     for t in (clock[::-1], np.zeros(50), clock[:-1], clock - once, clock - 1.3 * once):
         with pytest.raises(ValueError, match="t must increase"):
             laps(t, track)
+
+
+def circle(turns, n=300, radius=1.5):
+    """A circle (n, 2) through the origin, counter-clockwise."""
+    angle = np.linspace(0, 2 * np.pi * turns, n)
+    return radius * np.stack([np.cos(angle) - 1, np.sin(angle)], axis=1)
+
+
+@pytest.mark.parametrize("rate", [10, 100])
+@pytest.mark.parametrize("jitter", [0.0, 0.01])
+@pytest.mark.parametrize("seed", range(3))
+def test_jitter_costs_no_lap(rate, jitter, seed):
+    """Five laps are five when every sample jitters by 10 mm, also at 100 Hz, where that is as long as the way."""
+    t, positions = walk_figure_eights(6, seed, period=1 / rate)
+    walked = slice(int(0.3 * rate * 16), int(5.4 * len(t) / 6))
+    shaken = positions + np.random.default_rng(seed).normal(0, jitter, positions.shape)
+    cut = cut_laps(t[walked], shaken[walked])
+    assert len(cut.laps) == 5
+    assert cut.way == pytest.approx(arc_length(positions[walked][:: rate // 10])[-1], rel=0.15)
+
+
+def test_laps_are_samples_and_not_smoothed():
+    """What jitter does to the way it does not do to the laps: they are samples of the track, and times say which."""
+    track = eight(3.5, 3501) + np.random.default_rng(0).normal(0, 0.01, (3501, 2))
+    cut = cut_laps(0.01 * np.arange(3501), track)
+    samples = np.round(cut.times / 0.01).astype(int)
+    for lap, first, last in zip(cut.laps, samples[:-1], samples[1:], strict=True):
+        np.testing.assert_allclose(lap, track[first : last + 1])
+
+
+@pytest.mark.parametrize("turns", [1.0, 1.25, 1.5, 1.9])
+@pytest.mark.parametrize("shape", [eight, circle])
+def test_less_than_two_laps_are_one_walk(shape, turns):
+    """One lap and a half are kept whole: nothing is dropped, and nothing is in doubt."""
+    track = shape(turns, 400)
+    cut = cut_laps(np.arange(400), track)
+    np.testing.assert_allclose(*cut.laps, track)
+    assert cut.dropped == 0 and not any(note.doubt for note in cut.notes)
+
+
+@pytest.mark.parametrize("turns", [2.5, 3.4, 5.7])
+def test_what_is_dropped_is_told(turns):
+    """Ways before, in and after the laps add up to the whole, and a note says so beyond a tenth."""
+    cut = cut_laps(np.arange(1000), eight(turns, 1000))
+    kept = sum(arc_length(lap)[-1] for lap in cut.laps)
+    assert len(cut.laps) == int(turns)
+    assert cut.before + kept + cut.after == pytest.approx(cut.way, rel=0.01)
+    assert cut.dropped == pytest.approx(1 - int(turns) / turns, abs=0.02)
+    (note,) = cut.notes
+    numbers = f"{cut.dropped:.0%}", f"{cut.before:.1f} m before", f"{cut.after:.1f} m after", f"{DROPPED:.0%}"
+    assert note.kind == "laps" and note.doubt and all(number in note.text for number in numbers)
+
+
+def test_good_laps_have_no_notes():
+    """Five laps and hardly more leave nothing to tell."""
+    assert cut_laps(np.arange(1000), eight(5.1, 1000)).notes == ()
+
+
+def spiral(turns, pitch):
+    """A spiral (600, 2) from 0.5 m outwards."""
+    angle = np.linspace(0, 2 * np.pi * turns, 600)
+    return ((0.5 + pitch * angle / (2 * np.pi)) * np.stack([np.cos(angle), np.sin(angle)])).T
+
+
+def slalom(side):
+    """Once along a slalom (160, 2) of 6 m, and back beside it; the first cone is passed on a side, 1 or -1."""
+    there, back = np.linspace(-3, 3, 100), np.linspace(3, -3, 60)
+    along = np.stack([there, 0.5 * side * np.sin(np.pi * there / 3)], axis=1)
+    return np.vstack([along, np.stack([back, np.full(60, -1.6)], axis=1)])
+
+
+UNLIKE = {
+    "cones passed on the other side": np.vstack([slalom(1), slalom(1), slalom(-1), slalom(-1)]),
+    "two circles": np.vstack([circle(1), circle(1, radius=2.0)]),
+    "circles left, then right": np.vstack([circle(2), -circle(2)]),
+    "circles, then figure-eights": np.vstack([circle(2, radius=2.0), eight(2, 600)]),
+    "there and back again": np.vstack([circle(3), circle(3)[::-1]]),
+    "spiral": spiral(4, 0.5),
+    "narrow spiral": spiral(8, 0.15),
+}
+
+
+@pytest.mark.parametrize("track", UNLIKE.values(), ids=UNLIKE)
+def test_other_tasks_are_no_laps(track):
+    """Two tasks one after the other, and the turns of a spiral, are one walk, of which nothing is dropped."""
+    cut = cut_laps(np.arange(len(track)), track + np.random.default_rng(1).normal(0, 0.005, track.shape))
+    assert len(cut.laps) == 1 and len(cut.laps[0]) == len(track)
+    assert cut.dropped == 0 and not any(note.doubt for note in cut.notes)
+
+
+def test_a_walk_kept_whole_says_why():
+    """Laps that lie apart are named with their distance and the rule."""
+    (note,) = cut_laps(np.arange(640), UNLIKE["cones passed on the other side"]).notes
+    assert note.kind == "laps" and not note.doubt
+    assert "kept whole" in note.text and "apart" in note.text and "12%" in note.text
+
+
+@pytest.mark.parametrize("pause", [100, 1000])
+def test_standing_within_a_lap_opens_and_costs_none(pause):
+    """Who stands still, jittering, in the midst of a lap has walked as many laps."""
+    track, rng = eight(3.3, 1000), np.random.default_rng(3)
+    stood = np.vstack([track[:450], np.repeat(track[450:451], pause, axis=0), track[450:]])
+    cut = cut_laps(np.arange(len(stood)), stood + rng.normal(0, 0.01, stood.shape))
+    assert len(cut.laps) == 3
+    assert cut.way == pytest.approx(arc_length(track)[-1], rel=0.15)
+
+
+@settings(max_examples=20)
+@given(st.floats(1e-3, 1e3))
+def test_laps_have_no_unit(scale):
+    """The same walk in other units has the same laps."""
+    assert len(laps(np.arange(500), scale * eight(3.4, 500))) == 3
+
+
+@pytest.mark.parametrize("n", [3, 4, 7, 20])
+def test_a_short_track_is_one_walk(n):
+    """Three samples are enough to be a walk, and too few to repeat it."""
+    cut = cut_laps(np.arange(n), eight(0.9, n))
+    assert len(cut.laps) == 1 and len(cut.laps[0]) == n
+
+
+@pytest.mark.parametrize("turns", [100, 400])
+def test_a_long_walk_keeps_all_its_laps(turns):
+    """A hundred laps are a hundred: the length of a lap is found however small a share of the walk it is."""
+    for more in (0.2, 0.5):
+        assert len(laps(np.arange(20001), eight(turns + more, 20001))) == turns
+
+
+def test_a_clock_of_gaps_is_refused():
+    """Times that leave most of the walk to be filled in are refused, as are those that are no numbers."""
+    track, clock = eight(2, 50), np.arange(50.0)
+    with pytest.raises(ValueError, match="t must not consist of gaps, got 50 times for 1e\\+09 s"):
+        laps(np.append(clock[:-1], 1e9), track)
+    with pytest.raises(ValueError, match="t must increase"):
+        laps(np.append(clock[:-1], np.inf), track)

@@ -1,6 +1,7 @@
 """Sec. IV-B and V: tasks adapt to moved objects, are learned from several demonstrations, saved and loaded."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dollop import Demonstration, Environment, FormatError, Task, learn, match
+from dollop.checks import Note
 from dollop.task import anchors, members_along
 
 CANS = np.array([[2.3, 3.4, 2.7, 3.8], [6.3, 3.4, 6.7, 3.8]])
@@ -275,6 +277,36 @@ def test_one_more_demonstration_can_be_added(tmp_path):
     np.testing.assert_allclose(
         task.adapt(moved).add(shown[2]).law.subgoals, learned.law.subgoals + [0.3, 0.1], atol=1e-6
     )
+
+
+def observed(turns, notes=None):
+    """What an observation holds of a user who walked so many figure-eights, and what it notes, if it can."""
+    path, n = np.tile(eight()[:-1], (4, 1))[: int(159 * turns)], int(159 * turns)
+    user = SimpleNamespace(t=0.1 * np.arange(n), positions=path)
+    told = {} if notes is None else {"notes": notes}
+    return SimpleNamespace(user=user, environment=Environment(CANS), **told)
+
+
+@pytest.mark.parametrize("notes", [None, (), (Note("map", "the map may be another room's"),)])
+def test_a_demonstration_tells_what_was_dropped(notes):
+    """It carries the notes of its observation, and one more where half a lap of two and a half is in no lap."""
+    carried = notes or ()
+    assert Demonstration.of(observed(2.02, notes)).notes == carried
+    *before, last = Demonstration.of(observed(2.5, notes)).notes
+    assert tuple(before) == carried
+    assert (last.kind, last.doubt) == ("laps", True) and "20%" in last.text
+
+
+def test_a_task_tells_what_its_demonstrations_told(tmp_path):
+    """Once each, adapted or added to; notes are not saved."""
+    one, other = Demonstration.of(observed(2.5)), Demonstration.of(observed(3.5))
+    task = learn([one, other, one])
+    assert task.notes == (*one.notes, *other.notes) and len(task.notes) == 2
+    assert Task.of(one).notes == task.adapt(Environment(CANS + 0.3)).notes[:1] == one.notes
+    assert Task.of(one).add(other).notes == task.notes
+    task.save(tmp_path / "task.json")
+    assert Task.load(tmp_path / "task.json").notes == ()
+    assert Task.of(Demonstration(eight(), Environment(CANS))).notes == ()
 
 
 def test_speeds_are_those_of_the_clock():
