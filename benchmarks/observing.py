@@ -157,7 +157,8 @@ def judge_moved(world, observation):
     """Right: the boxes at the end are right, and a note mentions an object; told: a note does."""
     boxes = judge_boxes(world, observation)
     note = any("object" in kind for kind in notes(observation))
-    row = judge_walk(world, observation) | {"note": note, "boxes_right": boxes["right"], "false": boxes["false"]}
+    walk = judge_walk(world, observation)
+    row = walk | {"note": note, "walk_right": walk["right"], "boxes_right": boxes["right"], "false": boxes["false"]}
     return row | {"right": boxes["right"] and note, "told": note}
 
 
@@ -195,7 +196,18 @@ def table(rows):
         for name, share in (("mean_error", 0.95), ("covered", 0.05)):
             values = some.get(name, pd.Series(dtype=float)).astype(float)
             line |= {name: values.median(), f"{name} {share:.0%}": values.quantile(share)}
-        others = ("found", "wrong", "seen_error", "hidden_error", "recall", "sides", "assumed", "false", "boxes_right")
+        others = (
+            "found",
+            "wrong",
+            "seen_error",
+            "hidden_error",
+            "recall",
+            "sides",
+            "assumed",
+            "false",
+            "walk_right",
+            "boxes_right",
+        )
         for name in (*others, "note", *(each for each in some if each.startswith("recall_"))):
             if name in some:
                 line[name] = some[name].astype(float).mean()
@@ -236,7 +248,8 @@ def show(kind, seed, path):
     axes.set_title(", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()), wrap=True)
     (left, low), (right, high) = world.fixed[0].min(axis=0) - 0.5, world.fixed[0].max(axis=0) + 0.5
     axes.set(aspect="equal", xlim=(left, right), ylim=(low, high))
-    axes.legend()
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend()
     figure.savefig(path, dpi=80)
     plt.close(figure)
     return row
@@ -270,10 +283,10 @@ def main(arguments=None):
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--show", type=int, metavar="SEED", help="draw one world into --out")
-    parser.add_argument("--out", help="a csv of one row per world, or the picture")
+    parser.add_argument("--out", help="a csv of one row per world, or the picture (observing.png by default)")
     asked = parser.parse_args(arguments)
     if asked.show is not None:
-        print(show(asked.kind[0], asked.show, asked.out))
+        print(show(asked.kind[0], asked.show, asked.out or "observing.png"))
         return
     seeds = range(asked.first_seed, asked.first_seed + asked.worlds)
     tasks = (delayed(measure)(kind, seed) for kind in asked.kind for seed in seeds)
