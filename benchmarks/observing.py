@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 
-from benchmarks.strangers import KINDS, bounds, draw_world, in_view, turned
+from benchmarks.strangers import KINDS, bounds, draw_world, in_view
 from dollop import observe
 
 NEAR = 0.4
@@ -238,7 +238,8 @@ def show(kind, seed, path):
         for thing in things:
             axes.plot(*np.vstack([thing, thing[:1]]).T, style, lw=1)
     axes.plot(*world.log.poses[:, :2].T, "k.")
-    axes.plot(*(world.pose[:2] + np.outer([0, 0.5], turned(np.array([1.0, 0.0]), world.pose[2]))).T, "k-", lw=2)
+    x, y, heading = world.log.poses[0]
+    axes.plot([x, x + 0.5 * np.cos(heading)], [y, y + 0.5 * np.sin(heading)], "k-", lw=2)
     for k, person in enumerate(world.people):
         who = "who is meant" if k == world.meant else "another one"
         axes.plot(*person.middle.T, "-", color=f"C{k}", lw=4, alpha=0.3, label=f"{who} ({person.pace:.2f} m/s)")
