@@ -18,7 +18,7 @@ from dollop.foreground import (
     surface_points,
 )
 from dollop.gridmap import flat_cells, in_cells
-from dollop.people import Followed, candidates, joined, moving_speed, off_standing, person_of, stood, together
+from dollop.people import REACH, SLACK, Followed, candidates, joined, moving_speed, off_standing, person_of, stood, together
 from dollop.tracking import Motion, Track, Tracker, identify_user, track_objects, user_track
 from dollop.trajectory import arc_length
 
@@ -242,8 +242,9 @@ class Observer:
         t = np.array(self.followed.t)
         area = float(np.clip(self.background.free.sum() * self.background.resolution**2, 5.0, 200.0))
         cells, rows = self.standing, self.standing.standing
-        pieces = off_standing(self.followed.pieces(), cells.places[rows], cells.since[rows], t)
         gone = np.array(list(cells.gone.values())).reshape(-1, 6)
+        stands = np.column_stack([cells.places[rows], cells.since[rows], np.full(len(rows), np.inf)])
+        pieces = off_standing(self.followed.pieces(), np.vstack([stands, gone[:, [0, 1, 4, 5]]]), t)
         standing = stood(gone, pieces, t, self.step_angle)
         pieces = sorted(standing + pieces, key=lambda each: each[0, 0])
         persons = joined(pieces, t, area, self.background.way_length, self.motion)
@@ -256,7 +257,7 @@ class Observer:
         environment, groups = self._environment(people, user)
         notes = (*notes, *self._map_notes(), *self._object_notes(environment, groups, gone, people))
         if user is not None:
-            notes += tuple(user_notes(user, who, people, self.user, self.background))
+            notes += tuple(user_notes(user, who, people, tracks, self.user))
         losses = 0 if who is None else len(who.gaps)
         return Observation(tuple(tracks), user, environment, losses, people, notes)
 
@@ -437,30 +438,44 @@ def fastness(people):
     return np.where(ways >= LONG_ENOUGH * ways.max(), [moving_speed(track) for track in people], 0.0)
 
 
-def user_notes(user, person, people, choice, background):
+def user_notes(user, person, people, tracks, choice):
     """What is in doubt about the user."""
-    others = [track for track in people if track is not user]
-    if choice == "fastest" if isinstance(choice, str) else False:
-        speeds = fastness(people)
+    if isinstance(choice, str):
         mine = moving_speed(user)
-        near = [s for s, track in zip(speeds, people, strict=True) if track is not user and s > mine - ALIKE]
+        near = [fast for fast, who in zip(fastness(people), people, strict=True) if who is not user and fast > mine - ALIKE]
         if near:
-            yield Note("people", f"{1 + len(near)} people walk about as fast ({mine:.2f} and {max(near):.2f} m/s)")
-    if person.doubts:
-        yield Note("exchange", f"at {person.doubts[0] - user.t[0]:.1f} s of the walk somebody else may have gone on")
-    way = arc_length(user.positions)[-1]
-    for track in others:
-        gap = max(track.t[0] - user.t[-1], user.t[0] - track.t[-1])
-        ends = (user.positions[-1], track.positions[0]) if track.t[0] > user.t[-1] else (track.positions[-1], user.positions[0])
-        if 0 < gap < 15 and np.linalg.norm(ends[1] - ends[0]) < 2.0 * gap + 0.5 and arc_length(track.positions)[-1] > 0.05 * way:
-            yield Note("pieces", f"somebody walked {arc_length(track.positions)[-1]:.1f} m, {gap:.1f} s apart: it may be the user")
-    if len(person.gaps) and (longest := np.diff(person.gaps).max()) > 4.5:
-        yield Note("gap", f"the user was out of sight for {longest:.1f} s (at most 4.5)")
+            speeds = f"{mine:.2f} and {max(near):.2f} m/s, less than {ALIKE:g} apart"
+            yield Note("people", f"{1 + len(near)} people walk about as fast ({speeds})")
+    for when in person.doubts[:1]:
+        yield Note("exchange", f"{when - user.t[0]:.1f} s after the user was first seen somebody else may have gone on")
+    for other in tracks:
+        gap, way = could_be(user, other), arc_length(other.positions)[-1]
+        if gap is not None and way > LEFT_OUT:
+            yield Note("pieces", f"somebody who was seen {gap:.1f} s apart and walked {way:.1f} m may be the user too")
+    longest = np.diff(person.gaps).max(initial=0)
+    if longest > LONGEST_BRIDGE:
+        yield Note("gap", f"the user was out of sight for {longest:.1f} s at a time (at most {LONGEST_BRIDGE:g})")
     seen = 1 - user.occluded.mean()
-    if seen < 0.6:
-        yield Note("seen", f"the user was in sight for {seen:.0%} of the walk (at least 60 %)")
-    if (top := user.speeds.max()) > 3.0:
-        yield Note("speed", f"the user would have walked at {top:.1f} m/s (at most 3)")
+    if seen < LEAST_SEEN:
+        yield Note("seen", f"the user was in sight for {seen:.0%} of the time (at least {LEAST_SEEN:.0%})")
+    if user.speeds.max() > TOP_SPEED:
+        yield Note("speed", f"the user would have walked at {user.speeds.max():.1f} m/s (at most {TOP_SPEED:g})")
+
+
+LEFT_OUT = 0.3
+"""m that somebody who may be the user has walked to be missed."""
+LONGEST_BRIDGE, LEAST_SEEN, TOP_SPEED = 4.5, 0.6, 3.0
+"""s, share and m/s beyond which a walk is in doubt."""
+MAY_COME_BACK = 15.0
+"""s after which nobody is taken for the same."""
+
+
+def could_be(user, other):
+    """Seconds between the times of two tracks of which one may go on as the other, or None."""
+    first, second = (user, other) if user.t[-1] < other.t[0] else (other, user)
+    gap = second.t[0] - first.t[-1]
+    apart = np.linalg.norm(second.positions[0] - first.positions[-1])
+    return gap if 0 < gap < MAY_COME_BACK and apart < REACH * gap + SLACK else None
 
 
 ALIKE = 0.15

@@ -54,8 +54,6 @@ ALONE = 0.65
 MOVED, STANDS_WITHIN = 0.5, 0.5
 """m from where it began, from which on a piece is of somebody who walks; and m within which who
 walked is standing."""
-CREEPS = 0.1
-"""m/s up to which a piece is of something that flickers, not of somebody who walks."""
 OFTEN = 0.4
 """Share of the scans in which somebody is seen who is in sight."""
 ROW = 8
@@ -133,13 +131,13 @@ class Piece:
     Both axes share one covariance, P = [[pxx, pxv], [pxv, pvv]].
     """
 
-    __slots__ = "x y vx vy pxx pxv pvv seen rows born begin far anchor arrived".split()
+    __slots__ = "x y vx vy pxx pxv pvv seen rows begin far anchor arrived".split()
 
     def __init__(self, place, t):
         self.x, self.y, self.vx, self.vy = *place, 0.0, 0.0
         self.pxx, self.pxv, self.pvv = SURE**2, 0.0, 1.0
         self.seen, self.rows, self.far = t, array("d"), 0.0
-        self.begin, self.anchor, self.born, self.arrived = place, place, t, t
+        self.begin, self.anchor, self.arrived = place, place, t
 
     def predict(self, dt, q):
         """x <- F x, P <- F P F^T + Q over a time in s, for a noise of density q in m^2/s^3."""
@@ -244,8 +242,7 @@ class Followed:
 def worth_keeping(piece):
     """Whether a piece may be of somebody's way: seen often enough, and not all in one place."""
     n, scans = len(piece.rows) // ROW, piece.rows[-ROW] - piece.rows[0] + 1
-    on_the_way = piece.far > 0.25 + CREEPS * (piece.seen - piece.born)
-    return n >= 4 and n >= OFTEN * scans and (piece.far > MOVED or on_the_way)
+    return n >= 4 and n >= OFTEN * scans and piece.far > 0.25
 
 
 # ---- what stood, and who walked from there
@@ -254,8 +251,8 @@ STOOD_LINK, WIDE = 0.35, 0.75
 """m: cells so near to each other stood and went together; what is wider than that is nobody."""
 BEGAN = 1.0
 """s: who begins to walk so soon before or after what stood there was seen last is who stood there."""
-ON = 0.20
-"""m from a cell that stands within which a measurement is of what stands."""
+ON, STAYS = 0.20, 0.5
+"""m from a cell that stands within which a measurement is of what stands, and s that it goes on to."""
 
 
 def stood(gone, pieces, t, step):
@@ -323,16 +320,14 @@ def standing_rows(group, pieces, t, step):
     return rows
 
 
-def off_standing(pieces, places, since, t):
-    """Pieces without the measurements at their beginning that are of something that still stands.
+def off_standing(pieces, stood, t):
+    """Pieces without the measurements at their beginning that are of something that stands.
 
     Parameters
     ----------
     pieces : list of (n, 8) float arrays
-    places : (S, 2) float array
-        Cells that stand, in m.
-    since : (S,) float array
-        Since when, in s.
+    stood : (S, 4) float array
+        Cells where something stands or stood: place in m, since and until in s.
     t : (T,) float array
         Time of each scan in s.
 
@@ -340,13 +335,17 @@ def off_standing(pieces, places, since, t):
     -------
     list of (n, 8) float arrays
     """
-    if not len(places):
+    if not len(stood):
         return pieces
-    tree, kept = scipy.spatial.cKDTree(places), []
+    tree, kept = scipy.spatial.cKDTree(stood[:, :2]), []
     for rows in pieces:
-        away, cell = tree.query(rows[:, 1:3])
-        on = (away < ON) & (since[cell] <= t[rows[:, 0].astype(int)] + 0.1)
-        first = len(rows) if on.all() else int(np.argmin(on))
+        when = t[rows[:, 0].astype(int)]
+        on = np.zeros(len(rows), bool)
+        for k, cells in enumerate(tree.query_ball_point(rows[:, 1:3], ON)):
+            on[k] = ((stood[cells, 2] <= when[k] + 0.1) & (stood[cells, 3] >= when[k] + STAYS)).any()
+            if not on[k]:
+                break
+        first = int(on.sum())
         if len(rows) - first >= 3:
             kept.append(rows[first:])
     return kept
@@ -361,8 +360,8 @@ PRIOR = 3.0
 """Log odds, before anything is seen, that who comes into sight is who was last seen."""
 DOUBTFUL = 2.0
 """Log odds over the next best assignment below which a joint is not made."""
-END = np.array([[0.08**2, 0.0], [0.0, 0.25**2]])
-"""Covariance, m and m/s, of where and how fast somebody was at the end of a piece."""
+END_SD, END_SPEED_SD = 1.3, 0.3
+"""How much worse than its measurements the place at the end of a piece is known, and its velocity in m/s."""
 TURNS, ABRUPT = 0.1, 10.0
 """Share of the joints at which somebody turns sharply, and how much more noise that is."""
 CLOSE, BESIDE = 0.8, 0.6
@@ -425,9 +424,10 @@ def joined(pieces, t, area, way=None, motion=None):
     pieces = apart_where_confused(pieces, t)
     ends = [ends_of(rows, t, motion) for rows in pieces]
     odds = np.zeros((len(pieces), len(pieces)))
-    for i, (_, last) in enumerate(ends):
-        for j, (first, _) in enumerate(ends):
-            odds[i, j] = log_odds(last, first, area, way, motion)
+    begins, stops = (np.array([each[k][0] for each in ends]) for k in (0, 1))
+    gaps = begins - stops[:, None]
+    for i, j in np.argwhere((gaps > 0) & (gaps <= LONGEST_GAP)):
+        odds[i, j] = log_odds(ends[i][1], ends[j][0], area, way, motion)
     after, doubts = best_assignment(odds)
     persons, begun = [], set(after.values())
     for i in range(len(pieces)):
@@ -444,13 +444,14 @@ def joined(pieces, t, area, way=None, motion=None):
 
 
 def ends_of(rows, t, motion):
-    """Time in s, place in m and velocity in m/s, (2,) each, at the beginning and the end of a piece."""
+    """Time in s, place and velocity (2,) in m and m/s, covariance (2, 2), at both ends of a piece."""
     scans = rows[:, 0].astype(int)
     states = []
     for part in (slice(0, 12), slice(-12, None)):
         place, velocity = smooth(t[scans[part]], middles_of(rows[part]), motion, rows[part, 6])
         k = 0 if part.start == 0 else -1
-        states.append((t[scans[part]][k], place[k], velocity[k]))
+        sd = END_SD * rows[part, 6].mean()
+        states.append((t[scans[part]][k], place[k], velocity[k], np.diag([sd**2, END_SPEED_SD**2])))
     return states
 
 
@@ -458,11 +459,11 @@ def log_odds(last, first, area, way, motion):
     """Log odds that who was last seen is who comes into sight, 0 where it cannot be."""
     gap, offset = first[0] - last[0], first[1] - last[1]
     reach = REACH * gap + SLACK
-    if not 0 < gap <= LONGEST_GAP or hypot(*offset) > reach:
+    if hypot(*offset) > reach:
         return 0.0
     F, Q = motion.transition(gap)
     error = np.array([offset - gap * last[2], first[2] - last[2]])
-    steady, abrupt = (normal(error, more * Q + F @ END @ F.T + END) for more in (1.0, ABRUPT))
+    steady, abrupt = (normal(error, more * Q + F @ last[3] @ F.T + first[3]) for more in (1.0, ABRUPT))
     fit = np.logaddexp(log(1 - TURNS) + steady, log(TURNS) + abrupt)
     anew = -log(area) - 0.5 * np.sum(first[2] ** 2) - log(2 * pi)
     odds = fit - anew + PRIOR
