@@ -38,6 +38,8 @@ EDGE = 0.10
 """m: a neighbouring beam so much nearer or farther has met something else."""
 NARROW, STRIDE = 0.26, 0.65
 """m: a candidate narrower than this may be a leg; two such nearer than this are one person."""
+OTHER_LEG = 0.10
+"""m: where one leg is hidden, the middle is so far from the other."""
 WIDEST = 0.60
 """m: nobody is wider."""
 SURE, VAGUE = 0.05, 0.14
@@ -594,15 +596,40 @@ def smooth_in_sight(t, measurements, motion, sd):
     """Positions and velocities (N, 2): smoothed while in sight, and between as `bridge` has it."""
     seen = np.flatnonzero(np.isfinite(measurements[:, 0]))
     parts = np.split(seen, np.flatnonzero(np.diff(t[seen]) > BRIDGED) + 1)
-    parts = [surely(part, t, sd, k > 0, k + 1 < len(parts)) for k, part in enumerate(parts)]
     positions, velocities = np.empty((2, len(t), 2))
-    for part in parts:
+
+    def lay(part):
         lived = slice(part[0], part[-1] + 1)
         positions[lived], velocities[lived] = smooth(t[lived], measurements[lived], motion, sd[lived])
-    for before, after in zip(parts[:-1], parts[1:], strict=True):
-        ends, hidden = [before[-1], after[0]], slice(before[-1] + 1, after[0])
-        positions[hidden], velocities[hidden] = bridge(t[ends], positions[ends], velocities[ends], t[hidden])
+        return t[lived], positions[lived].copy(), velocities[lived].copy()
+
+    ends = []
+    for k, part in enumerate(parts):
+        sure = surely(part, t, sd, k > 0, k + 1 < len(parts))
+        when, places, seen_so = lay(sure)
+        slow = [np.hypot(*way_at(when, places, edge)) < SLOW for edge in (0, -1)]  # seen surely, they only stand
+        begin, end = part[0] if slow[0] else sure[0], part[-1] if slow[1] else sure[-1]
+        parts[k] = part[(part >= begin) & (part <= end)]
+        when, places, _ = lay(parts[k])
+        ends.append([way_at(when, places, edge) if slow[edge] else seen_so[edge] for edge in (0, -1)])
+    speeds = np.concatenate([np.hypot(*velocities[part[0] : part[-1] + 1].T) for part in parts])
+    pace = np.median(speeds[speeds > SLOW]) if (speeds > SLOW).any() else 0.0
+    for k in range(len(parts) - 1):
+        edge, hidden = [parts[k][-1], parts[k + 1][0]], slice(parts[k][-1] + 1, parts[k + 1][0])
+        ways = np.array([ends[k][1], ends[k + 1][0]])
+        positions[hidden], velocities[hidden] = bridge(t[edge], positions[edge], ways, t[hidden], pace)
     return positions, velocities
+
+
+def way_at(t, places, end):
+    """Velocity (2,) in m/s over the last moments of a stretch (n,), or the first for an end of 0."""
+    there = np.abs(t - t[end]) <= MOMENT
+    first, last = np.flatnonzero(there)[[0, -1]]
+    return (places[last] - places[first]) / max(t[last] - t[first], 1e-9)
+
+
+MOMENT = 0.8
+"""s over which the velocity of somebody badly seen is taken."""
 
 
 def surely(part, t, sd, first, last):
@@ -618,7 +645,7 @@ BRIDGED = 0.5
 """s out of sight from which on what is between is a bridge."""
 
 
-def bridge(t, places, velocities, when):
+def bridge(t, places, velocities, when, pace):
     """The way of somebody out of sight, who goes on as fast as before.
 
     A cubic curve that leaves one place and reaches the other in the directions seen there, and
@@ -632,6 +659,8 @@ def bridge(t, places, velocities, when):
         There and then, m and m/s.
     when : (M,) float array
         Times between, s.
+    pace : float
+        How fast they walk, m/s.
 
     Returns
     -------
@@ -642,19 +671,19 @@ def bridge(t, places, velocities, when):
     --------
     Who goes behind a box and comes back on the other side of it has walked round it:
 
-    >>> back = bridge(np.array([0.0, 3.0]), np.array([[0.0, 0.0], [0.0, 0.5]]), np.array([[1.0, 0], [-1.0, 0]]), [1.5])
+    >>> back = bridge(np.array([0.0, 3.0]), np.array([[0.0, 0.0], [0.0, 0.5]]), np.array([[1.0, 0], [-1.0, 0]]), [1.5], 1.0)
     >>> back[0].round(1)
     array([[1.3, 0.2]])
     """
     seconds, chord = t[1] - t[0], places[1] - places[0]
     speeds = np.hypot(*velocities.T)
-    length = max(speeds.mean() * seconds, np.hypot(*chord))
-    slow = speeds < SLOW
-    if slow.any():  # who stands has no direction
-        directions = np.where(slow[:, None], chord / max(np.hypot(*chord), 1e-9), velocities)
-        length = np.hypot(*chord)
-    else:
-        directions = velocities
+    moving = speeds > SLOW
+    straight = np.hypot(*chord)
+    length = max(pace * seconds, straight) if moving.any() else straight
+    directions = np.where(moving[:, None], velocities, chord)
+    if moving.sum() == 1:  # who stands has no direction: straight from where the other one leads
+        halfway = (0.4 * length / speeds[moving]) * velocities[moving]
+        directions = np.where(moving[:, None], velocities, chord - halfway if moving[0] else chord + halfway)
     directions = directions / np.maximum(np.hypot(*directions.T), 1e-9)[:, None]
     share = np.linspace(0, 1, 101)[:, None]
 
@@ -676,7 +705,7 @@ def bridge(t, places, velocities, when):
     return positions, walked[-1] / seconds * ahead
 
 
-SLOW, MOST_SWING = 0.2, 4.0
+SLOW, MOST_SWING = 0.25, 4.0
 """m/s below which somebody stands; and by how much more than on a straight way a bridge may swing out."""
 
 
@@ -690,7 +719,9 @@ def fitted_middles(rows, velocities):
     inner = np.clip(1 - 2 * width / np.maximum(across, 1e-3), -1, 1)
     arc = (pi / 2 - np.arcsin(inner) - inner * np.sqrt(1 - inner**2)) / (2 * (1 - inner).clip(1e-6))
     behind = np.where(cut, arc * depth, np.where(body, pi / 4 * depth, pi / 4 * width))
-    aside = np.where(cut, side * (across - width), 0.0)[:, None] * np.column_stack([-rows[:, 4], rows[:, 3]])
+    leg = (np.abs(side) == 1) & ~body & (rows[:, 5] > 0) & (np.median(rows[:, 5]) < NARROW)
+    hidden = np.where(cut, across - width, np.where(leg, OTHER_LEG, 0.0))
+    aside = (side * hidden)[:, None] * np.column_stack([-rows[:, 4], rows[:, 3]])
     middles = rows[:, 1:3] + behind[:, None] * rows[:, 3:5] + aside
     return middles, np.where(cut, (SURE + rows[:, 6]) / 2, rows[:, 6])
 
