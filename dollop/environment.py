@@ -286,8 +286,8 @@ FLAT = 0.10
 """m: a box seen no deeper than this shows one face only."""
 ROUND = 0.22
 """Share of its extent by which the near corner of a box is empty where what stands there is round."""
-SHADOW, ONE_OBJECT = 0.45, 1.3
-"""m: two surfaces so near are one where something hides all that is between, and make no larger box."""
+APART, ONE_OBJECT = 0.40, 1.5
+"""m: two surfaces nearer than that are one where no beam passes between, and make no larger box."""
 UNSURE = 0.20
 """m between beams on a grazed face, from which on its end is not known."""
 
@@ -296,7 +296,8 @@ def standing_boxes(places, sensors, step, scan=None, min_area=0.01):
     """Boxes round what stands, from the readings on its near faces (Sec. IV; a reconstruction).
 
     Neighbouring cells are one surface; surfaces whose completed boxes overlap are one object, and
-    so are those between which all is in the shadow of something nearer. Where a face along an axis
+    so are near ones between which no beam passes: they fall apart at corners, where the beams
+    graze, and in the shadow of something nearer. Where a face along an axis
     was seen, its two ends are sides of the box; where none was, the object is taken to be as deep
     as it is wide, and its far side is assumed.
 
@@ -412,12 +413,10 @@ def one_object(boxes, groups, places, scan):
             (a, _), (b, _) = boxes[i], boxes[j]
             apart = np.maximum(np.maximum(a[:2] - b[2:], b[:2] - a[2:]), 0.0)
             both = np.maximum(a[2:], b[2:]) - np.minimum(a[:2], b[:2])
-            if not apart.any() or (
-                np.hypot(*apart) < SHADOW
-                and both.max() <= ONE_OBJECT
-                and scan is not None
-                and hidden_between(places[groups[i]], places[groups[j]], *scan)
-            ):
+            if not apart.any():
+                return i, j
+            near = np.hypot(*apart) < APART and both.max() <= ONE_OBJECT and scan is not None
+            if near and nothing_between(places[groups[i]], places[groups[j]], *scan):
                 return i, j
     return None
 
@@ -429,14 +428,13 @@ def bearings_of(places, pose):
     return (bearing + np.pi) % (2 * np.pi) - np.pi, np.hypot(offset[:, 0], offset[:, 1])
 
 
-def hidden_between(some, others, pose, angles, ranges):
-    """Whether every beam between two surfaces (M, 2), (L, 2) met something nearer than both."""
-    (a, near_a), (b, near_b) = bearings_of(some, pose), bearings_of(others, pose)
-    low, high = (a.max(), b.min()) if a.mean() < b.mean() else (b.max(), a.min())
-    between = (angles > low) & (angles < high)
-    if np.ptp(angles[between]) > np.pi / 2 if between.any() else False:
-        return False
-    return bool((ranges[between] < min(near_a.min(), near_b.min()) - 0.05).all())
+def nothing_between(some, others, pose, angles, ranges):
+    """Whether two surfaces (M, 2), (L, 2) are near, and no beam passes between them."""
+    pairs = scipy.spatial.distance.cdist(some, others)
+    i, j = np.unravel_index(pairs.argmin(), pairs.shape)
+    bearing, distance = bearings_of(np.array([some[i], others[j]]), pose)
+    between = (angles > bearing.min()) & (angles < bearing.max())
+    return bool(pairs[i, j] < APART and (ranges[between] < distance.max() + 0.10).all())
 
 
 def hidden_ends(places, scan):

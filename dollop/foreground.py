@@ -579,7 +579,9 @@ class SeenFloor:
 
     def __init__(self, background, resolution=0.10):
         self.origin, self.resolution = background.origin, resolution
-        self.shape = tuple(np.ceil(np.multiply(background.occupancy.shape, background.resolution / resolution)).astype(int))
+        self.shape = tuple(
+            np.ceil(np.multiply(background.occupancy.shape, background.resolution / resolution)).astype(int)
+        )
         self.first = np.full(self.shape[0] * self.shape[1], np.inf)
         self.last = None
 

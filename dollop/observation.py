@@ -18,7 +18,21 @@ from dollop.foreground import (
     surface_points,
 )
 from dollop.gridmap import flat_cells, in_cells
-from dollop.people import REACH, SLACK, Followed, candidates, joined, moving_speed, off_standing, person_of, stood, together
+from dollop.people import (
+    BRIDGED,
+    MOVED,
+    OVERLAP,
+    REACH,
+    SLACK,
+    Followed,
+    candidates,
+    joined,
+    moving_speed,
+    off_standing,
+    person_of,
+    stood,
+    together,
+)
 from dollop.tracking import Motion, Track, Tracker, identify_user, track_objects, user_track
 from dollop.trajectory import arc_length
 
@@ -304,11 +318,15 @@ class Observer:
                 yield Note("object went", f"{what} was gone after {when - begin:.1f} s")
             else:
                 x, y = environment.centres[to]
-                yield Note("object moved", f"{what} was moved to ({x:.2f}, {y:.2f}) {when - begin:.1f} s after the start")
+                yield Note(
+                    "object moved", f"{what} was moved to ({x:.2f}, {y:.2f}) {when - begin:.1f} s after the start"
+                )
                 del came[to]
         for k, when in came.items():
             x, y = environment.centres[k]
-            yield Note("object came", f"an object stands at ({x:.2f}, {y:.2f}) since {when - begin:.1f} s after the start")
+            yield Note(
+                "object came", f"an object stands at ({x:.2f}, {y:.2f}) since {when - begin:.1f} s after the start"
+            )
 
     def _came(self, rows, gone):
         """Since when an object stands whose place had been seen free before; else the beginning."""
@@ -367,9 +385,9 @@ def went(gone, stands, people, min_area):
 
 
 def was_there(track, place, begin, end):
-    """Whether somebody stood at a place at the end of a time."""
-    when = (track.t > max(begin, end - 2.0)) & (track.t < end + 0.5)
-    return bool(when.any() and (np.linalg.norm(track.positions[when] - place, axis=1) < STANDING_REACH).any())
+    """Whether somebody stood at a place before the end of a time, most of its last two seconds."""
+    when = (track.t > max(begin, end - 2.0)) & (track.t < end)
+    return bool(when.any() and (np.linalg.norm(track.positions[when] - place, axis=1) < STANDING_REACH).mean() > 0.6)
 
 
 def unlike(box, other):
@@ -380,16 +398,20 @@ def unlike(box, other):
 STANDING_REACH = 0.5
 """m from the middle of somebody within which readings are theirs."""
 MOST_FOREGROUND = 0.5
-FOREGROUND, KNOWN, UNKNOWN = 1, 0, 2
-"""What a reading is by the map: not explained; explained; where the map knows of no floor."""
+FOREGROUND = 1
 
 
 def reading_classes(background, radius):
-    """What a reading in each cell of the map is, (H * W,) uint8."""
+    """Whether a reading in each cell of the map is foreground, (H * W,) uint8.
+
+    It is where no background object is within the radius (Sec. II), and the map knows the floor: on
+    the side of a table that the map has never seen, nobody can say what is new.
+    """
     if not (background.free.any() and background.occupied.any()):
         raise ValueError("the background map must hold free and occupied cells: it knows of nothing")
-    classes = (background.distance_field() > radius).astype(np.uint8)
-    return classes.ravel()
+    holes = scipy.ndimage.binary_opening(background.unknown, np.ones((3, 3)))
+    known = ~scipy.ndimage.binary_dilation(holes, np.ones((3, 3)))
+    return (known & (background.distance_field() > radius)).astype(np.uint8).ravel()
 
 
 def checked_user(user):
@@ -403,9 +425,12 @@ def checked_user(user):
 
 
 def walks(track):
-    """Whether somebody walks there, and is no flicker."""
-    away = np.linalg.norm(track.positions - track.positions[0], axis=1).max()
-    return away > 0.6 and np.count_nonzero(~track.occluded) >= 5 and np.ptp(track.t) >= 0.8
+    """Whether somebody was seen to walk there, and is no flicker, and nothing that was put elsewhere."""
+    seen = np.flatnonzero(~track.occluded)
+    stretches = np.split(seen, np.flatnonzero(np.diff(track.t[seen]) > BRIDGED) + 1)
+    places = [track.positions[some] for some in stretches]
+    ways = [np.linalg.norm(some - some[0], axis=1).max() for some in places]
+    return max(ways) > MOVED and len(seen) >= 5 and np.ptp(track.t) >= 0.8
 
 
 def choose(people, user):
@@ -442,7 +467,9 @@ def user_notes(user, person, people, tracks, choice):
     """What is in doubt about the user."""
     if isinstance(choice, str):
         mine = moving_speed(user)
-        near = [fast for fast, who in zip(fastness(people), people, strict=True) if who is not user and fast > mine - ALIKE]
+        near = [
+            fast for fast, who in zip(fastness(people), people, strict=True) if who is not user and fast > mine - ALIKE
+        ]
         if near:
             speeds = f"{mine:.2f} and {max(near):.2f} m/s, less than {ALIKE:g} apart"
             yield Note("people", f"{1 + len(near)} people walk about as fast ({speeds})")
@@ -472,10 +499,10 @@ MAY_COME_BACK = 15.0
 
 def could_be(user, other):
     """Seconds between the times of two tracks of which one may go on as the other, or None."""
-    first, second = (user, other) if user.t[-1] < other.t[0] else (other, user)
+    first, second = (user, other) if user.t[0] < other.t[0] else (other, user)
     gap = second.t[0] - first.t[-1]
     apart = np.linalg.norm(second.positions[0] - first.positions[-1])
-    return gap if 0 < gap < MAY_COME_BACK and apart < REACH * gap + SLACK else None
+    return max(gap, 0.0) if -OVERLAP < gap < MAY_COME_BACK and apart < REACH * max(gap, 0) + SLACK else None
 
 
 ALIKE = 0.15

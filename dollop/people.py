@@ -30,7 +30,17 @@ import scipy
 from dollop.tracking import Motion, Track, smooth
 from dollop.trajectory import arc_length, at_arc_length
 
-__all__ = ["Followed", "Person", "candidates", "joined", "moving_speed", "off_standing", "person_of", "stood", "together"]
+__all__ = [
+    "Followed",
+    "Person",
+    "candidates",
+    "joined",
+    "moving_speed",
+    "off_standing",
+    "person_of",
+    "stood",
+    "together",
+]
 
 JUMP, SPREAD = 0.12, 1.5
 """Neighbouring readings farther apart than `JUMP` m plus `SPREAD` beam spacings are different surfaces."""
@@ -133,7 +143,7 @@ class Piece:
     Both axes share one covariance, P = [[pxx, pxv], [pxv, pvv]].
     """
 
-    __slots__ = "x y vx vy pxx pxv pvv seen rows begin far anchor arrived".split()
+    __slots__ = ["x", "y", "vx", "vy", "pxx", "pxv", "pvv", "seen", "rows", "begin", "far", "anchor", "arrived"]
 
     def __init__(self, place, t):
         self.x, self.y, self.vx, self.vy = *place, 0.0, 0.0
@@ -254,7 +264,8 @@ STOOD_LINK, WIDE = 0.35, 0.75
 BEGAN = 1.0
 """s: who begins to walk so soon before or after what stood there was seen last is who stood there."""
 ON, STAYS = 0.20, 0.5
-"""m from a cell that stands within which a measurement is of what stands, and s that it goes on to."""
+"""m, and a quarter of its width, from a cell that stands within which a measurement is of what
+stands; and s that it goes on to."""
 
 
 def stood(gone, pieces, t, step):
@@ -296,7 +307,9 @@ def followed_there(group, pieces, t):
     begin, end = group[:, 4].min(), np.median(group[:, 5])
     for rows in pieces:
         when = t[rows[:, 0].astype(int)]
-        there = (when >= begin) & (when <= end) & (np.linalg.norm(rows[:, 1:3] - group[:, :2].mean(axis=0), axis=1) < ALONE)
+        there = (
+            (when >= begin) & (when <= end) & (np.linalg.norm(rows[:, 1:3] - group[:, :2].mean(axis=0), axis=1) < ALONE)
+        )
         if there.any() and np.ptp(when[there]) > 0.7 * (end - begin):
             return True
     return False
@@ -343,7 +356,7 @@ def off_standing(pieces, stood, t):
     for rows in pieces:
         when = t[rows[:, 0].astype(int)]
         on = np.zeros(len(rows), bool)
-        for k, cells in enumerate(tree.query_ball_point(rows[:, 1:3], ON)):
+        for k, cells in enumerate(tree.query_ball_point(rows[:, 1:3], ON + rows[:, 5] / 4)):
             on[k] = ((stood[cells, 2] <= when[k] + 0.1) & (stood[cells, 3] >= when[k] + STAYS)).any()
             if not on[k]:
                 break
@@ -369,6 +382,8 @@ TURNS, ABRUPT = 0.1, 10.0
 CLOSE, BESIDE = 0.8, 0.6
 """m from somebody out of sight within which another may be taken for them; and within which both
 may be one candidate."""
+OVERLAP = 0.5
+"""s that somebody may be followed on, wrongly, after they have come into sight elsewhere."""
 SHORT_GAP = 0.15
 """s: who is out of sight for less cannot be confused."""
 
@@ -428,8 +443,10 @@ def joined(pieces, t, area, way=None, motion=None):
     odds = np.zeros((len(pieces), len(pieces)))
     begins, stops = (np.array([each[k][0] for each in ends]) for k in (0, 1))
     gaps = begins - stops[:, None]
-    for i, j in np.argwhere((gaps > 0) & (gaps <= LONGEST_GAP)):
-        odds[i, j] = log_odds(ends[i][1], ends[j][0], area, way, motion)
+    for i, j in np.argwhere((gaps > -OVERLAP) & (gaps <= LONGEST_GAP) & (begins > begins[:, None])):
+        last = ends[i][1] if gaps[i, j] > 0 else end_before(pieces[i], pieces[j], t, motion)
+        if last is not None:
+            odds[i, j] = log_odds(last, ends[j][0], area, way, motion)
     after, doubts = best_assignment(odds)
     persons, begun = [], set(after.values())
     for i in range(len(pieces)):
@@ -440,9 +457,21 @@ def joined(pieces, t, area, way=None, motion=None):
             chain.append(after[chain[-1]])
         gaps = [(ends[a][1][0], ends[b][0][0]) for a, b in zip(chain[:-1], chain[1:], strict=True)]
         when = [ends[a][1][0] for a in chain if a in doubts[0]] + [ends[b][0][0] for b in chain if b in doubts[1]]
-        rows = np.concatenate([pieces[k] for k in chain])
+        parts = [before(pieces[a], pieces[b]) for a, b in zip(chain[:-1], chain[1:], strict=True)]
+        rows = np.concatenate([*parts, pieces[chain[-1]]])
         persons.append(Person(rows, np.array(gaps).reshape(-1, 2), tuple(sorted(when))))
     return persons
+
+
+def before(rows, later):
+    """What of a piece is before another begins."""
+    return rows[rows[:, 0] < later[0, 0]]
+
+
+def end_before(rows, later, t, motion):
+    """The end of a piece where another begins, see `ends_of`; None if there is hardly any before."""
+    rows = before(rows, later)
+    return ends_of(rows, t, motion)[1] if len(rows) >= 3 else None
 
 
 def ends_of(rows, t, motion):
