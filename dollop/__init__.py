@@ -19,6 +19,8 @@ II    z           measured centroid of a foreground object      `Track.measureme
 II                greedy search of tracks for objects           `tracking.match_greedily`
 II                occluded; disappeared after 5 seconds         `Tracker.disappear_after`
 II                user: the fastest foreground object           `tracking.identify_user`
+II                people, each as far as it is surely the same  `people`
+II                what stands, and since when                   `foreground.StandingCells`
 III   p_n         position on a trajectory                      `trajectory`
 III               laps: walks along one trajectory              `laps`
 III   x_n         position relative to a segment's subgoal      `LDS.step`
@@ -53,6 +55,7 @@ SI units throughout; a pose is (x, y, theta); time comes first in every array.
 
 from dollop.association import Association, Frames, associate, associate_with_frames
 from dollop.cdhmm import SubgoalHMM
+from dollop.checks import Note
 from dollop.environment import Environment
 from dollop.formats import FormatError, read_log, write_log
 from dollop.gridmap import OccupancyGrid
@@ -60,7 +63,7 @@ from dollop.laps import laps
 from dollop.laser import LaserLog
 from dollop.lds import LDS
 from dollop.matching import Matching, match
-from dollop.observation import Observation, observe
+from dollop.observation import Observation, Observer, observe
 from dollop.robot import Run, Unicycle, perform
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
@@ -70,7 +73,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "LDS", "Association", "Demonstration", "Environment", "FormatError", "Frames", "LaserLog",
-    "Matching", "Motion", "Observation", "OccupancyGrid", "Run", "SequencedLDS", "SubgoalHMM",
+    "Matching", "Motion", "Note", "Observation", "Observer", "OccupancyGrid", "Run", "SequencedLDS", "SubgoalHMM",
     "Task", "Track", "Tracker", "Unicycle", "__version__", "associate", "associate_with_frames",
     "laps", "learn", "match", "observe", "perform", "read_log", "write_log",
 ]  # fmt: skip

@@ -438,6 +438,8 @@ LONGEST_STEP = 0.5
 """s: a pause between scans counts for no more."""
 BEYOND = 0.10
 """m by which a beam must have gone on behind a cell to have passed it."""
+LEAVING = 0.6
+"""s without a hit after which a cell that beams pass stands no more."""
 TOUCH = 0.06
 """m round a cell that stands in which a reading belongs to it."""
 
@@ -461,8 +463,8 @@ class StandingCells:
     ----------
     cells : (A,) int array
         Flat indices of the cells that are remembered.
-    value, since, until : (A,) float arrays
-        v, and the times in s of the first and the last hit.
+    value, since, until, passed : (A,) float arrays
+        v, and the times in s of the first and the last hit, and when a beam last passed.
     places, sensors : (A, 2) float arrays
         Mean of the readings in a cell, and where it was seen from last, m.
     known_since : (H * W,) float array
@@ -471,7 +473,7 @@ class StandingCells:
         By cell where something stood and is no more: place (2) and sensor (2) in m, since, until.
     """
 
-    COLUMNS = "cells", "value", "since", "until", "places", "sensors", "looks"
+    COLUMNS = "cells", "value", "since", "until", "passed", "places", "sensors", "looks"
 
     def __init__(self, background, after=1.2):
         check_positive("after", after)
@@ -479,7 +481,7 @@ class StandingCells:
         self.shape, self.resolution = background.occupancy.shape, background.resolution
         self.origin = np.asarray(background.origin, dtype=float)
         self.cells, self.value = np.zeros(0, np.intp), np.zeros(0)
-        self.since, self.until = np.zeros(0), np.zeros(0)
+        self.since, self.until, self.passed = np.zeros(0), np.zeros(0), np.zeros(0)
         self.places, self.sensors, self.looks = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
         size = self.shape[0] * self.shape[1]
         self._row = np.full(size, -1, np.int32)
@@ -528,6 +530,7 @@ class StandingCells:
         free[rows] = False
         before = self.value > 0.5
         self.value[free] -= gain * self.value[free]
+        self.passed[free] = t
         self.value[rows] += gain * (1 - self.value[rows])
         ended = np.flatnonzero(before & (self.value <= 0.5))
         for k in ended.tolist():
@@ -545,7 +548,7 @@ class StandingCells:
         """Add cells (M,), seen for the first time at `t` s."""
         n, none = len(cells), np.zeros(len(cells))
         self._row[cells] = len(self.cells) + np.arange(n)
-        new = cells, none, np.full(n, t), np.full(n, t), np.zeros((n, 2)), np.zeros((n, 2)), none
+        new = cells, none, np.full(n, t), np.full(n, t), np.full(n, -np.inf), np.zeros((n, 2)), np.zeros((n, 2)), none
         for name, values in zip(self.COLUMNS, new, strict=True):
             setattr(self, name, np.concatenate([getattr(self, name), values]))
 
@@ -560,8 +563,9 @@ class StandingCells:
 
     @property
     def standing(self):
-        """(S,) rows of the cells where something stands."""
-        return np.flatnonzero(self.value > 0.5)
+        """(S,) rows of the cells where something stands, and has not just gone."""
+        leaving = (self.passed > self.until) & (self.until < self.last - LEAVING)
+        return np.flatnonzero((self.value > 0.5) & ~leaving)
 
 
 class SeenFloor:

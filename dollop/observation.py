@@ -354,10 +354,11 @@ def arrival(track):
 
 
 def slides(track):
-    """Whether somebody may be an object that is moved: stands, is slow, and stands again."""
+    """Whether somebody may be an object that is moved: it stands, goes slowly straight on, and stands."""
     still = track.speeds < 0.15
     at_ends = still[track.t < track.t[0] + 1.0].mean() > 0.5 and still[track.t > track.t[-1] - 1.0].mean() > 0.5
-    return bool(at_ends and moving_speed(track) < SLIDES)
+    way, straight = arc_length(track.positions)[-1], np.linalg.norm(track.positions[-1] - track.positions[0])
+    return bool(at_ends and moving_speed(track) < SLIDES and straight > 0.8 * way)
 
 
 def nearest(points, others):

@@ -456,6 +456,7 @@ def joined(pieces, t, area, way=None, motion=None):
         while chain[-1] in after:
             chain.append(after[chain[-1]])
         gaps = [(ends[a][1][0], ends[b][0][0]) for a, b in zip(chain[:-1], chain[1:], strict=True)]
+        gaps = [gap for gap in gaps if gap[1] - gap[0] > PATIENCE]
         when = [ends[a][1][0] for a in chain if a in doubts[0]] + [ends[b][0][0] for b in chain if b in doubts[1]]
         parts = [before(pieces[a], pieces[b]) for a, b in zip(chain[:-1], chain[1:], strict=True)]
         rows = np.concatenate([*parts, pieces[chain[-1]]])
