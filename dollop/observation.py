@@ -207,6 +207,7 @@ class Observer:
 
     def _readings(self, ranges, poses):
         """Foreground readings: scan, beam, x, y in m and flat cell of each, all (n,)."""
+        ranges = np.where(np.isfinite(ranges), ranges, np.nan)  # infinity times a cosine of zero warns
         cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
         ahead, left = self._directions
         x = poses[:, :1] + ranges * (cos * ahead - sin * left)
