@@ -1,4 +1,4 @@
-"""Sec. II: foreground cells, the autoregressive foreground grid, blobs and foreground objects."""
+"""Sec. II: foreground cells, the autoregressive foreground grid, blobs and foreground objects; what stands, in seconds."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from dollop.foreground import (
     ForegroundGrid,
+    SeenFloor,
+    StandingCells,
     _blob_centroids,
     _closed_up,
     bounding_boxes,
@@ -251,3 +253,101 @@ def test_occupied_is_above_one_half():
         grid.update(can, pose, ANGLES, np.full(181, 2.5))
         np.testing.assert_allclose(grid.value[can], value)
         assert len(grid.blobs()) == len(grid.objects()) == count
+
+
+# ---- what stands, remembered in seconds
+
+POSE = np.array([4.0, 0.5, np.pi / 2])
+RATES = [4.5, 5.0, 10.0, 20.0, 40.0]
+
+
+def looked(cells, seconds, rate, hit=True, begin=0.0, ranges=2.5):
+    """Let a memory look, whenever it is due, at a can (4, 3) that a beam hits, or at what is there instead."""
+    can = np.array([[4.01, 3.01]])
+    flat = hits(cells, *can[0])
+    for t in begin + np.arange(0, seconds, 1 / rate):
+        if cells.due(t):
+            where = (flat, can) if hit else (flat[:0], can[:0])
+            cells.look(t, *where, POSE, ANGLES, np.full(181, ranges))
+    return cells
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_what_is_hit_stands_after_a_time_whatever_the_rate(rate):
+    """Not yet after 0.8 s, and surely after 1.6 s, by lasers from 4.5 to 40 scans a second."""
+    for seconds, count in ((0.8, 0), (1.6, 1)):
+        cells = looked(StandingCells(room()), seconds, rate)
+        assert len(cells.standing) == count
+    assert cells.since[cells.standing] == 0.0
+    assert cells.known_since[hits(cells, 4.01, 3.01)] == 0.0 and np.isinf(cells.known_since[0])
+
+
+@given(st.lists(st.tuples(st.floats(0.15, 0.5), st.booleans()), min_size=1, max_size=15))
+def test_standing_follows_its_autoregression(steps):
+    """A cell's value is v <- v + (1 - exp(-dt / tau)) (hit - v), written out; what has faded is forgotten."""
+    cells, now, value, tau = StandingCells(room(), after=1.2), 0.0, 0.0, 1.2 / np.log(2)
+    looked(cells, 0.01, 1.0)
+    value = 1 - np.exp(-0.15 / tau)
+    for dt, hit in steps:
+        now, last = now + dt + 1e-9, now
+        looked(cells, 0.01, 1.0, hit, now, 2.5 if hit else 6.0)
+        gain = 1 - np.exp(-(now - last) / tau)
+        value += gain * (hit - value)
+        value = 0.0 if not hit and value < 0.5 * gain else value
+        assert cells.value.tolist() == pytest.approx([value] if value else [])
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_what_stands_in_the_shadow_stands_on(rate):
+    """However long somebody stands before it: neither does it fade, nor is it gone."""
+    cells = looked(StandingCells(room()), 2.0, rate)
+    looked(cells, 60.0, rate, hit=False, begin=2.0, ranges=1.0)
+    assert len(cells.standing) == 1 and not cells.gone
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_what_goes_is_gone_with_when_and_where(rate):
+    """Where beams pass that hit before: from when until when it stood is known, to the time of a scan or two."""
+    cells = looked(StandingCells(room()), 3.0, rate, begin=1.0)
+    looked(cells, 3.0, rate, hit=False, begin=4.0, ranges=6.0)
+    assert len(cells.standing) == 0
+    ((x, y, *sensor, since, until),) = cells.gone.values()
+    assert (x, y, *sensor) == pytest.approx((4.01, 3.01, 4.0, 0.5))
+    assert since == pytest.approx(1.0) and until == pytest.approx(4.0, abs=0.15 + 1 / rate)
+
+
+def test_a_pause_counts_for_no_more_than_half_a_second():
+    """Hit twice an hour apart does not stand; nor does what stands fade from one look after a pause."""
+    cells = looked(looked(StandingCells(room()), 0.01, 1.0), 0.01, 1.0, begin=3600.0)
+    assert len(cells.standing) == 0
+    cells = looked(StandingCells(room()), 6.0, 10.0)
+    looked(cells, 0.01, 1.0, hit=False, begin=3600.0, ranges=6.0)
+    assert cells.value[0] > 0.5
+
+
+def test_an_empty_room_leaves_nothing_behind():
+    """Single hits all over the room, each passed by beams later, are forgotten again."""
+    cells, rng = StandingCells(room()), np.random.default_rng(0)
+    for k in range(2000):
+        x, y = rng.uniform(1.0, 7.0, 2)
+        cells.look(0.2 * k, hits(cells, x, y), np.array([[x, y]]), POSE, ANGLES, np.full(181, 9.0))
+    assert len(cells.cells) < 10 and not cells.gone
+
+
+def test_the_floor_is_seen_where_beams_pass_and_end():
+    """Up to the reading and not behind it; what does not come back is not believed."""
+    floor, ranges = SeenFloor(room()), np.full(181, 3.0)
+    ranges[100:] = np.inf
+    floor.look(7.0, POSE, ANGLES, ranges)
+    places = np.array([[4.0, 2.0], [5.0, 2.0], [4.0, 3.35], [4.0, 4.0], [2.0, 2.0], [4.0, -3.0]])
+    assert floor.first_at(places).tolist() == [7.0, 7.0, 7.0, np.inf, np.inf, np.inf]
+    assert floor.grid().sum() == pytest.approx(np.pi * 3**2 / 4 / 0.01, rel=0.15)
+
+
+def test_the_floor_keeps_when_it_was_seen_first():
+    """A second look adds what is new, and changes no time; looks come no more often than once a second."""
+    floor, near, far = SeenFloor(room()), np.array([[4.0, 2.0]]), np.array([[4.0, 5.0]])
+    floor.look(1.0, POSE, ANGLES, np.full(181, 3.0))
+    assert not floor.due(1.5) and floor.due(2.0)
+    floor.look(2.0, POSE, ANGLES, np.full(181, 6.0))
+    assert floor.first_at(near) == 1.0 and floor.first_at(far) == 2.0
