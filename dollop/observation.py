@@ -156,7 +156,7 @@ class Observer:
         self._class = reading_classes(background, background_radius)
         self.motion, self.followed = Motion(), Followed()
         self.standing, self.floor = StandingCells(background), SeenFloor(background)
-        self.returned = self.foreground = self.outside = 0
+        self.returned = self.outside = self.later = self.moving = 0
         self._scan = None
 
     def step(self, t, ranges, pose):
@@ -195,8 +195,12 @@ class Observer:
         scan, beam, x, y, cells = self._readings(ranges, poses)
         bounds = np.searchsorted(scan, np.arange(len(t) + 1)).tolist()
         points = np.column_stack([x, y])
+        count = np.isfinite(ranges).sum(axis=1).tolist()
         for i, now in enumerate(t.tolist()):
             part = slice(bounds[i], bounds[i + 1])
+            if self.followed.t and now - self.followed.t[0] > SHORTEST_LOOK:
+                self.later += count[i]
+                self.moving += int((self.standing.known_since[cells[part]] == np.inf).sum())
             here = cells[part]
             self.followed.step(now, self._candidates(beam[part], x[part], y[part], here, ranges[i], poses[i]))
             if self.standing.due(now):
@@ -221,7 +225,6 @@ class Observer:
         self.returned += int(returned.sum())
         self.outside += int((returned & ~inside).sum())
         scan, beam = np.nonzero(kind == FOREGROUND)
-        self.foreground += len(scan)
         return scan, beam, x[scan, beam], y[scan, beam], cells[scan, beam]
 
     def _candidates(self, beam, x, y, cells, ranges, pose):
@@ -286,10 +289,11 @@ class Observer:
         period = float(np.median(np.diff(self.followed.t))) if len(self.followed.t) > 1 else 0.0
         if period > SLOWEST:
             yield Note("slow scans", f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s")
-        share = self.foreground / max(self.returned, 1)
-        if share > MOST_FOREGROUND:
-            text = f"{share:.0%} of the readings are on nothing that the map knows (at most {MOST_FOREGROUND:.0%})"
-            yield Note("map", f"{text}: it does not fit the poses, or the room has changed")
+        share = self.moving / max(self.later, 1)
+        if share > MOST_MOVING:
+            text = f"{share:.0%} of the readings are on nothing that stands or that the map knows"
+            reason = "the map does not fit, or the laser moves and the poses do not say so"
+            yield Note("map", f"{text} (at most {MOST_MOVING:.0%}): {reason}")
 
     def _environment(self, people, user):
         """The objects that stand at the end, and the cells of each."""
@@ -401,8 +405,8 @@ def unlike(box, other):
 
 STANDING_REACH = 0.5
 """m from the middle of somebody within which readings are theirs."""
-MOST_FOREGROUND, SLOWEST = 0.5, 0.35
-"""Share of the readings that the map does not explain, and s between scans, beyond which nothing is sure."""
+MOST_MOVING, SLOWEST = 0.25, 0.35
+"""Share of the readings that are of nothing that stands, and s between scans, beyond which nothing is sure."""
 FOREGROUND = 1
 
 
