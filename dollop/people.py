@@ -400,8 +400,8 @@ def off_standing(pieces, stood, t):
     Parameters
     ----------
     pieces : list of (n, 8) float arrays
-    stood : (S, 4) float array
-        Cells where something stands or stood: place in m, since and until in s.
+    stood : (S, 6) float array
+        Cells where something stands or stood: place and sensor in m, since and until in s.
     t : (T,) float array
         Time of each scan in s.
 
@@ -416,7 +416,7 @@ def off_standing(pieces, stood, t):
         when = t[rows[:, 0].astype(int)]
         on = np.zeros(len(rows), bool)
         for k, cells in enumerate(tree.query_ball_point(rows[:, 1:3], ON + rows[:, 5] / 4)):
-            on[k] = ((stood[cells, 2] <= when[k] + 0.1) & (stood[cells, 3] >= when[k] + STAYS)).any()
+            on[k] = ((stood[cells, 4] <= when[k] + 0.1) & (stood[cells, 5] >= when[k] + STAYS)).any()
             if not on[k]:
                 break
         first = int(on.sum())
