@@ -64,7 +64,7 @@ GATE, GATE_MIN, GATE_MAX = 3.0, 0.45, 1.0
 """Standard deviations, and bounds in m, within which a candidate is taken for who was expected."""
 AT_ONCE, FASTEST = 0.35, 3.0
 """m, and m/s: nobody is farther from where they were seen last; more is another one who was hidden."""
-PATIENCE = 0.6
+PATIENCE = 1.0
 """s out of sight after which a piece ends: what comes then is for `joined` to say."""
 ALONE = 0.65
 """m round somebody in which a narrow candidate is not somebody new."""
