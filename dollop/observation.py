@@ -42,6 +42,31 @@ STATIC_EVERY = 5
 """The paper's slow grid looks at every fifth scan: what is static is still there then."""
 METHODS = "people", "paper"
 """How somebody is observed: as people, or as the paper has it, every foreground object alike."""
+SAME_PLACE = 0.25
+"""m: what went and what stands there so near are the same, seen badly."""
+SLIDES = 0.6
+"""m/s up to which who stood before and stands afterwards may be an object that was moved."""
+SHORTEST_LOOK = 1.5
+"""s of scans that it takes to know what stands."""
+MOVED_WITHIN = 5.0
+"""s between the end of an object here and its beginning there for it to be the same."""
+STANDING_REACH = 0.5
+"""m from the middle of somebody within which readings are theirs."""
+MOST_MOVING, SLOWEST = 0.25, 0.35
+"""Share of the readings that are of nothing that stands, and s between scans, beyond which nothing is sure."""
+FOREGROUND = 1
+NOBODY_THERE = 1.5
+"""m from the place named beyond which nobody is meant."""
+LONG_ENOUGH = 0.4
+"""Share of the longest way that the user has walked at least."""
+LEFT_OUT = 0.3
+"""m that somebody who may be the user has walked to be missed."""
+LONGEST_BRIDGE, LEAST_SEEN, TOP_SPEED = 4.5, 0.6, 3.0
+"""s, share and m/s beyond which a walk is in doubt."""
+MAY_COME_BACK = 15.0
+"""s after which nobody is taken for the same."""
+ALIKE = 0.15
+"""m/s by which the user must be faster than others."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +145,7 @@ def observe(log, background, user="fastest", method="people", background_radius=
     if paper:
         raise ValueError(f'{", ".join(paper)} must come with method="paper"')
     observer = Observer(background, log.angles, user, background_radius, min_area)
-    observer.take(log.t, log.ranges, log.poses)
+    observer._take_all(log.t, log.ranges, log.poses)
     return observer.observation(log.notes)
 
 
@@ -156,7 +181,7 @@ class Observer:
         self._class = reading_classes(background, background_radius)
         self.motion, self.followed = Motion(), Followed()
         self.standing, self.floor = StandingCells(background), SeenFloor(background)
-        self.returned = self.foreground = self.outside = 0
+        self.returned = self.outside = self.later = self.moving = 0
         self._scan = None
 
     def step(self, t, ranges, pose):
@@ -182,9 +207,9 @@ class Observer:
         pose, t = checked_array("pose", pose, 3), float(t)
         if not np.isfinite(t) or (self.followed.t and t <= self.followed.t[-1]):
             raise ValueError(f"t must be later than the last scan's {self.followed.t[-1:].tolist()}, got {t}")
-        self.take(np.array([t]), ranges[None], pose[None])
+        self._take_all(np.array([t]), ranges[None], pose[None])
 
-    def take(self, t, ranges, poses):
+    def _take_all(self, t, ranges, poses):
         """Take several scans, as `step` takes one: times (T,), ranges (T, B), poses (T, 3)."""
         poses = np.column_stack([poses[:, :2], poses[:, 2] + self._middle])
         for some in np.array_split(np.arange(len(t)), 1 + ranges.size // 50_000):
@@ -195,8 +220,12 @@ class Observer:
         scan, beam, x, y, cells = self._readings(ranges, poses)
         bounds = np.searchsorted(scan, np.arange(len(t) + 1)).tolist()
         points = np.column_stack([x, y])
+        count = np.isfinite(ranges).sum(axis=1).tolist()
         for i, now in enumerate(t.tolist()):
             part = slice(bounds[i], bounds[i + 1])
+            if self.followed.t and now - self.followed.t[0] > SHORTEST_LOOK:
+                self.later += count[i]
+                self.moving += int((self.standing.known_since[cells[part]] == np.inf).sum())
             here = cells[part]
             self.followed.step(now, self._candidates(beam[part], x[part], y[part], here, ranges[i], poses[i]))
             if self.standing.due(now):
@@ -207,7 +236,8 @@ class Observer:
 
     def _readings(self, ranges, poses):
         """Foreground readings: scan, beam, x, y in m and flat cell of each, all (n,)."""
-        ranges = np.where(np.isfinite(ranges), ranges, np.nan)  # infinity times a cosine of zero warns
+        returned = np.isfinite(ranges)
+        ranges = np.where(returned, ranges, np.nan)
         cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
         ahead, left = self._directions
         x = poses[:, :1] + ranges * (cos * ahead - sin * left)
@@ -218,11 +248,9 @@ class Observer:
         column, row = np.where(inside, column, 0).astype(np.intp), np.where(inside, row, 0).astype(np.intp)
         cells = row * width + column
         kind = np.where(inside, self._class[cells], 0)
-        returned = np.isfinite(ranges)
         self.returned += int(returned.sum())
         self.outside += int((returned & ~inside).sum())
         scan, beam = np.nonzero(kind == FOREGROUND)
-        self.foreground += len(scan)
         return scan, beam, x[scan, beam], y[scan, beam], cells[scan, beam]
 
     def _candidates(self, beam, x, y, cells, ranges, pose):
@@ -256,10 +284,8 @@ class Observer:
         self._check_map()
         t = np.array(self.followed.t)
         area = float(np.clip(self.background.free.sum() * self.background.resolution**2, 5.0, 200.0))
-        cells, rows = self.standing, self.standing.standing
-        gone = np.array(list(cells.gone.values())).reshape(-1, 6)
-        stands = np.column_stack([cells.places[rows], cells.since[rows], np.full(len(rows), np.inf)])
-        pieces = off_standing(self.followed.pieces(), np.vstack([stands, gone[:, [0, 1, 4, 5]]]), t)
+        stands, gone = self.standing.standing(), self.standing.stood()
+        pieces = off_standing(self.followed.pieces(), np.vstack([stands, gone]), t)
         standing = stood(gone, pieces, t, self.step_angle)
         pieces = sorted(standing + pieces, key=lambda each: each[0, 0])
         persons = joined(pieces, t, area, self.background.way_length, self.motion)
@@ -269,8 +295,8 @@ class Observer:
         chosen = choose(people, self.user)
         user = None if chosen is None else people[chosen]
         who = None if chosen is None else persons[walked[chosen]]
-        environment, groups = self._environment(people, user)
-        notes = (*notes, *self._map_notes(), *self._object_notes(environment, groups, gone, people))
+        environment, groups = self._environment(stands, people, user)
+        notes = (*notes, *self._map_notes(), *self._object_notes(environment, groups, stands, gone, people))
         if user is not None:
             notes += tuple(user_notes(user, who, people, tracks, self.user))
         losses = 0 if who is None else len(who.gaps)
@@ -287,34 +313,32 @@ class Observer:
         period = float(np.median(np.diff(self.followed.t))) if len(self.followed.t) > 1 else 0.0
         if period > SLOWEST:
             yield Note("slow scans", f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s")
-        share = self.foreground / max(self.returned, 1)
-        if share > MOST_FOREGROUND:
-            text = f"{share:.0%} of the readings are on nothing that the map knows (at most {MOST_FOREGROUND:.0%})"
-            yield Note("map", f"{text}: it does not fit the poses, or the room has changed")
+        share = self.moving / max(self.later, 1)
+        if share > MOST_MOVING:
+            text = f"{share:.0%} of the readings are on nothing that stands or that the map knows"
+            reason = "the map does not fit, or the laser moves and the poses do not say so"
+            yield Note("map", f"{text} (at most {MOST_MOVING:.0%}): {reason}")
 
-    def _environment(self, people, user):
-        """The objects that stand at the end, and the cells of each."""
-        cells, rows, now = self.standing, self.standing.standing, self.followed.t[-1]
+    def _environment(self, stands, people, user):
+        """The objects that stand at the end, and the cells (S_k, 6) of each."""
         for track in people:
             since = arrival(track)
-            if track.t[-1] > now - 1.0 and (track is user or not slides(track)):
-                there = np.linalg.norm(cells.places[rows] - track.positions[-1], axis=1) < STANDING_REACH
-                rows = rows[~(there & (cells.since[rows] >= since - 0.5))]
-        boxes, assumed, hidden, groups = standing_boxes(
-            cells.places[rows], cells.sensors[rows], self.step_angle, self._scan, self.min_area
-        )
+            if track.t[-1] > self.followed.t[-1] - 1.0 and (track is user or not slides(track)):
+                there = np.linalg.norm(stands[:, :2] - track.positions[-1], axis=1) < STANDING_REACH
+                stands = stands[~(there & (stands[:, 4] >= since - 0.5))]
+        found = standing_boxes(stands[:, :2], stands[:, 2:4], self.step_angle, self._scan, self.min_area)
+        boxes, assumed, hidden, groups = found
         seen = Seen(self.floor.grid(), self.floor.origin, self.floor.resolution)
-        return Environment(boxes, seen, assumed), [rows[each] for each in groups]
+        return Environment(boxes, seen, assumed), [stands[rows] for rows in groups]
 
-    def _object_notes(self, environment, groups, gone, people):
+    def _object_notes(self, environment, groups, stands, gone, people):
         """What came, went or moved meanwhile, and what was seen too shortly or in part."""
         begin, now = self.followed.t[0], self.followed.t[-1]
         if now - begin < SHORTEST_LOOK:
             text = f"the scans last {now - begin:.1f} s: what stands is known after {SHORTEST_LOOK:g} s"
             yield Note("short look", text)
-        stands = self.standing.places[self.standing.standing]
         came = {k: when for k, rows in enumerate(groups) if (when := self._came(rows, gone)) > begin + SHORTEST_LOOK}
-        for place, box, when in went(gone, stands, people, self.min_area):
+        for place, box, when in went(gone, stands[:, :2], people, self.min_area):
             near = [k for k in came if abs(came[k] - when) < MOVED_WITHIN]
             to = min(near, key=lambda k: unlike(environment.boxes[k], box), default=None)
             what = f"an object at ({place[0]:.2f}, {place[1]:.2f})"
@@ -332,23 +356,13 @@ class Observer:
                 "object came", f"an object stands at ({x:.2f}, {y:.2f}) since {when - begin:.1f} s after the start"
             )
 
-    def _came(self, rows, gone):
-        """Since when an object stands whose place had been seen free before; else the beginning."""
-        places, since = self.standing.places[rows], np.quantile(self.standing.since[rows], 0.1)
+    def _came(self, cells, gone):
+        """Since when an object of cells (S, 6) stands whose place had been seen free; else the beginning."""
+        places, since = cells[:, :2], np.quantile(cells[:, 4], 0.1)
         before = nearest(gone[:, :2], places) < SAME_PLACE
         if np.median(self.floor.first_at(places)) < since - 0.5 and not (gone[before, 4] < since - 0.5).any():
             return float(since)
         return self.followed.t[0]
-
-
-SAME_PLACE = 0.25
-"""m: what went and what stands there so near are the same, seen badly."""
-SLIDES = 0.6
-"""m/s up to which who stood before and stands afterwards may be an object that was moved."""
-SHORTEST_LOOK = 1.5
-"""s of scans that it takes to know what stands."""
-MOVED_WITHIN = 5.0
-"""s between the end of an object here and its beginning there for it to be the same."""
 
 
 def arrival(track):
@@ -398,13 +412,6 @@ def was_there(track, place, begin, end):
 def unlike(box, other):
     """By how much two boxes (4,) differ in size, m."""
     return float(np.abs((box[2:] - box[:2]).max() - (other[2:] - other[:2]).max()))
-
-
-STANDING_REACH = 0.5
-"""m from the middle of somebody within which readings are theirs."""
-MOST_FOREGROUND, SLOWEST = 0.5, 0.35
-"""Share of the readings that the map does not explain, and s between scans, beyond which nothing is sure."""
-FOREGROUND = 1
 
 
 def reading_classes(background, radius):
@@ -457,12 +464,6 @@ def choose(people, user):
     return k
 
 
-NOBODY_THERE = 1.5
-"""m from the place named beyond which nobody is meant."""
-LONG_ENOUGH = 0.4
-"""Share of the longest way that the user has walked at least."""
-
-
 def fastness(people):
     """(K,) speeds in m/s, 0 for those whose way is short beside the longest."""
     ways = np.array([arc_length(track.positions)[-1] for track in people])
@@ -495,24 +496,12 @@ def user_notes(user, person, people, tracks, choice):
         yield Note("speed", f"the user would have walked at {user.speeds.max():.1f} m/s (at most {TOP_SPEED:g})")
 
 
-LEFT_OUT = 0.3
-"""m that somebody who may be the user has walked to be missed."""
-LONGEST_BRIDGE, LEAST_SEEN, TOP_SPEED = 4.5, 0.6, 3.0
-"""s, share and m/s beyond which a walk is in doubt."""
-MAY_COME_BACK = 15.0
-"""s after which nobody is taken for the same."""
-
-
 def could_be(user, other):
     """Seconds between the times of two tracks of which one may go on as the other, or None."""
     first, second = (user, other) if user.t[0] < other.t[0] else (other, user)
     gap = second.t[0] - first.t[-1]
     apart = np.linalg.norm(second.positions[0] - first.positions[-1])
     return max(gap, 0.0) if -OVERLAP < gap < MAY_COME_BACK and apart < REACH * max(gap, 0) + SLACK else None
-
-
-ALIKE = 0.15
-"""m/s by which the user must be faster than others."""
 
 
 def observe_as_paper(
