@@ -259,16 +259,21 @@ def test_occupied_is_above_one_half():
 
 POSE = np.array([4.0, 0.5, np.pi / 2])
 RATES = [4.5, 5.0, 10.0, 20.0, 40.0]
+CAN = np.array([[4.01, 3.01]])
+CELL = hits(ForegroundGrid(room(), 1.0), *CAN[0])
 
 
-def looked(cells, seconds, rate, hit=True, begin=0.0, ranges=2.5):
-    """Let a memory look, whenever it is due, at a can (4, 3) that a beam hits, or at what is there instead."""
-    can = np.array([[4.01, 3.01]])
-    flat = hits(cells, *can[0])
+def look(cells, t, hit=True, ranges=None):
+    """One scan, in which a beam hits the can, or in its place goes on for 6 m or as far as it does."""
+    where = (CELL, CAN) if hit else (CELL[:0], CAN[:0])
+    cells.look(t, *where, POSE, ANGLES, np.full(181, ranges or (2.5 if hit else 6.0)))
+
+
+def looked(cells, seconds, rate, begin=0.0, **scan):
+    """Let a memory look, whenever it is due, at scans that come at a rate."""
     for t in begin + np.arange(0, seconds, 1 / rate):
         if cells.due(t):
-            where = (flat, can) if hit else (flat[:0], can[:0])
-            cells.look(t, *where, POSE, ANGLES, np.full(181, ranges))
+            look(cells, t, **scan)
     return cells
 
 
@@ -277,61 +282,65 @@ def test_what_is_hit_stands_after_a_time_whatever_the_rate(rate):
     """Not yet after 0.8 s, and surely after 1.6 s, by lasers from 4.5 to 40 scans a second."""
     for seconds, count in ((0.8, 0), (1.6, 1)):
         cells = looked(StandingCells(room()), seconds, rate)
-        assert len(cells.standing) == count
-    assert cells.since[cells.standing] == 0.0
-    assert cells.known_since[hits(cells, 4.01, 3.01)] == 0.0 and np.isinf(cells.known_since[0])
+        assert len(cells.standing()) == count
+    np.testing.assert_allclose(cells.standing(), [[4.01, 3.01, 4.0, 0.5, 0.0, np.inf]])
+    assert cells.known_since[CELL] == 0.0 and np.isinf(cells.known_since[0])
 
 
 @given(st.lists(st.tuples(st.floats(0.15, 0.5), st.booleans()), min_size=1, max_size=15))
 def test_standing_follows_its_autoregression(steps):
-    """A cell's value is v <- v + (1 - exp(-dt / tau)) (hit - v), written out; what has faded is forgotten."""
-    cells, now, value, tau = StandingCells(room(), after=1.2), 0.0, 0.0, 1.2 / np.log(2)
-    looked(cells, 0.01, 1.0)
+    """It stands where v <- v + (1 - exp(-dt / tau)) (hit - v), written out, exceeds a half, and it is not just going."""
+    cells, now, until, tau = StandingCells(room(), after=1.2), 0.0, 0.0, 1.2 / np.log(2)
+    look(cells, now)
     value = 1 - np.exp(-0.15 / tau)
     for dt, hit in steps:
-        now, last = now + dt + 1e-9, now
-        looked(cells, 0.01, 1.0, hit, now, 2.5 if hit else 6.0)
-        gain = 1 - np.exp(-(now - last) / tau)
+        now += dt
+        look(cells, now, hit)
+        gain = 1 - np.exp(-dt / tau)
         value += gain * (hit - value)
-        value = 0.0 if not hit and value < 0.5 * gain else value
-        assert cells.value.tolist() == pytest.approx([value] if value else [])
+        value = 0.0 if not hit and value < 0.5 * gain else value  # is forgotten
+        until = now if hit else until
+        if abs(value - 0.5) > 1e-6 and abs(now - until - 0.6) > 1e-6:
+            assert len(cells.standing()) == (value > 0.5 and (hit or now - until < 0.6))
 
 
 @pytest.mark.parametrize("rate", RATES)
 def test_what_stands_in_the_shadow_stands_on(rate):
     """However long somebody stands before it: neither does it fade, nor is it gone."""
     cells = looked(StandingCells(room()), 2.0, rate)
-    looked(cells, 60.0, rate, hit=False, begin=2.0, ranges=1.0)
-    assert len(cells.standing) == 1 and not cells.gone
+    looked(cells, 60.0, rate, begin=2.0, hit=False, ranges=1.0)
+    assert len(cells.standing()) == 1 and len(cells.stood()) == 0
 
 
 @pytest.mark.parametrize("rate", RATES)
 def test_what_goes_is_gone_with_when_and_where(rate):
     """Where beams pass that hit before: from when until when it stood is known, to the time of a scan or two."""
     cells = looked(StandingCells(room()), 3.0, rate, begin=1.0)
-    looked(cells, 3.0, rate, hit=False, begin=4.0, ranges=6.0)
-    assert len(cells.standing) == 0
-    ((x, y, *sensor, since, until),) = cells.gone.values()
-    assert (x, y, *sensor) == pytest.approx((4.01, 3.01, 4.0, 0.5))
+    looked(cells, 3.0, rate, begin=4.0, hit=False)
+    assert len(cells.standing()) == 0 and np.isinf(cells.known_since).all()
+    ((*where, since, until),) = cells.stood()
+    assert where == pytest.approx([4.01, 3.01, 4.0, 0.5])
     assert since == pytest.approx(1.0) and until == pytest.approx(4.0, abs=0.15 + 1 / rate)
 
 
 def test_a_pause_counts_for_no_more_than_half_a_second():
     """Hit twice an hour apart does not stand; nor does what stands fade from one look after a pause."""
-    cells = looked(looked(StandingCells(room()), 0.01, 1.0), 0.01, 1.0, begin=3600.0)
-    assert len(cells.standing) == 0
+    cells = StandingCells(room())
+    look(cells, 0.0)
+    look(cells, 3600.0)
+    assert len(cells.standing()) == 0
     cells = looked(StandingCells(room()), 6.0, 10.0)
-    looked(cells, 0.01, 1.0, hit=False, begin=3600.0, ranges=6.0)
-    assert cells.value[0] > 0.5
+    look(cells, 3600.0, hit=False)
+    assert len(cells.stood()) == 0
 
 
-def test_an_empty_room_leaves_nothing_behind():
-    """Single hits all over the room, each passed by beams later, are forgotten again."""
-    cells, rng = StandingCells(room()), np.random.default_rng(0)
+def test_single_hits_never_stand():
+    """Once here and once there all over the room, for hours: nothing stands, and nothing stood."""
+    cells, rng, grid = StandingCells(room()), np.random.default_rng(0), ForegroundGrid(room(), 1.0)
     for k in range(2000):
-        x, y = rng.uniform(1.0, 7.0, 2)
-        cells.look(0.2 * k, hits(cells, x, y), np.array([[x, y]]), POSE, ANGLES, np.full(181, 9.0))
-    assert len(cells.cells) < 10 and not cells.gone
+        place = rng.uniform(1.0, 7.0, (1, 2))
+        cells.look(5.0 * k, hits(grid, *place[0]), place, POSE, ANGLES, np.full(181, 9.0))
+    assert len(cells.standing()) == len(cells.stood()) == 0 and np.isinf(cells.known_since).all()
 
 
 def test_the_floor_is_seen_where_beams_pass_and_end():

@@ -263,7 +263,7 @@ def test_cells_become_a_square_away_from_the_sensor(quarters):
 
 
 TO_AND_FRO = walk([2, 2], [7, 2], [2, 2])
-MEETING = together(walk([2, 4.5], [7, 2]), walk([7, 4.5], [2, 2], speed=0.9))
+MEETING = together(walk([2, 4.5], [7, 2]), np.concatenate([nobody(0.5), walk([7, 4.5], [2, 2], speed=0.9)]))
 LONG = [2.6, 2.5, 4.0, 3.0]
 MOVED = [4.8, 4.8, 5.2, 5.2]
 STREAMS = {
@@ -366,11 +366,11 @@ def test_losses_are_the_times_out_of_sight():
 
 @pytest.mark.parametrize("user", [0, 1, (2.0, 4.5), (7.1, 4.3)])
 def test_the_user_is_who_is_named(user):
-    """By an index into the people, or by the place near which somebody was first seen."""
+    """By an index into the people, who are in the order in which they came, or by the place where they were first."""
     observation = observe(watched(MEETING), room_map(), user=user)
     k = user if isinstance(user, int) else int(user[0] > 4)
     assert observation.user is observation.people[k]
-    np.testing.assert_allclose(observation.user.positions[0], MEETING[0, k], atol=0.15)
+    np.testing.assert_allclose(observation.user.positions[0], MEETING[5 * k, k], atol=0.15)
 
 
 def test_the_fastest_is_the_user_and_a_tie_is_noted():
@@ -432,7 +432,8 @@ def allocated(observer, begin, log):
     """Bytes held more after an observer has taken a log from a time on, and the most meanwhile."""
     before, _ = tracemalloc.get_traced_memory()
     tracemalloc.reset_peak()
-    observer.take(begin + log.t, log.ranges, log.poses)
+    for t, ranges, pose in zip(log.t, log.ranges, log.poses, strict=True):
+        observer.step(begin + t, ranges, pose)
     after, peak = tracemalloc.get_traced_memory()
     return after - before, peak - before
 
@@ -449,9 +450,8 @@ def test_an_observer_of_an_empty_room_does_not_grow():
     """Of a scan in which nobody walks no more than its time is kept, though cans stand and beams are noisy."""
     log = watched(nobody(60.0), CANS, noise=0.015)
     observer = Observer(room_map(), log.angles)
-    observer.take(log.t, log.ranges, log.poses)
-    grown = [allocated(observer, 60.0 * k, log)[0] for k in (1, 2, 3)]
-    assert sum(grown) < 3 * len(log) * 16 + 20_000
+    grown = [allocated(observer, 60.0 * k, log)[0] for k in range(4)]
+    assert sum(grown[1:]) < 3 * len(log) * 16 + 20_000
 
 
 @pytest.mark.usefixtures("traced")
