@@ -121,9 +121,9 @@ def test_seen_is_false_off_the_map_and_where_no_beam_was():
 # ---- boxes round what stands
 
 
-def looked(box, sensor, step=np.radians(0.25)):
+def looked(box, sensor, degrees=0.25):
     """Where beams (M, 2) from a sensor meet a box, and the scan, in a room of 8 m."""
-    angles = np.arange(-np.pi, np.pi, step)
+    angles = np.arange(-np.pi, np.pi, np.radians(degrees))
     way = np.column_stack([np.cos(angles), np.sin(angles)])
     with np.errstate(divide="ignore"):
         low, high = ((box[side] - sensor) / way for side in (slice(0, 2), slice(2, 4)))
@@ -144,6 +144,15 @@ def test_a_box_of_which_two_faces_are_seen_is_known(width, depth, aside, before,
     boxes, assumed, _, groups = standing_boxes(seen, np.tile(sensor, (len(seen), 1)), np.radians(0.25), scan)
     np.testing.assert_allclose(boxes, [box], atol=0.07)
     assert not assumed.any() and len(groups[0]) == len(seen)
+
+
+def test_where_beams_graze_too_far_apart_the_far_side_is_assumed():
+    """Nearly along a side, one degree between beams: its end is not known, and that is told; the others are."""
+    box, sensor = np.array([3.0, 1.0, 3.6, 1.8]), np.array([2.9, -2.0])
+    seen, scan = looked(box, sensor, degrees=1.0)
+    boxes, assumed, *_ = standing_boxes(seen, np.tile(sensor, (len(seen), 1)), np.radians(1.0), scan)
+    assert assumed.tolist() == [[False, False, False, True]]
+    np.testing.assert_allclose(boxes[0, :3], box[:3], atol=0.05)
 
 
 @pytest.mark.parametrize("quarters", range(4))

@@ -12,9 +12,12 @@ from places import DATA
 from rooms import (
     ANGLES,
     CANS,
+    DEPTH,
     FURNITURE,
     SENSOR,
     WALLS,
+    WIDTH,
+    drawn_map,
     nobody,
     one_after_another,
     room_map,
@@ -362,6 +365,42 @@ def test_losses_are_the_times_out_of_sight():
     hidden = observe(watched(to_and_fro, LONG), room_map())
     assert hidden.losses == 2 and len(hidden.people) == 1
     assert observe(watched(to_and_fro), room_map()).losses == 0
+
+
+GOING, COMING = walk([7.5, 4.2], [3.0, 4.2]), walk([3.0, 4.2], [7.5, 4.2])
+
+
+@pytest.mark.parametrize(("seconds", "kind"), [(2.0, None), (3.5, "gap"), (5.5, "pieces")])
+def test_a_long_time_out_of_sight_is_noted(seconds, kind):
+    """Who waits behind a box is bridged; for longer a note says so, and then it is left open whether it is the same."""
+    waiting = np.repeat(GOING[-1:], round(10 * seconds), axis=0)
+    observation = observe(watched(np.concatenate([GOING, waiting, COMING]), LONG), room_map(), user=(7.5, 4.2))
+    assert [note.kind for note in observation.notes] == ([kind] if kind else [])
+    assert len(observation.people) == (2 if kind == "pieces" else 1)
+
+
+def test_a_user_who_is_mostly_out_of_sight_is_noted():
+    """Behind a box for two thirds of the time: a note tells the share that was seen."""
+    way = walk([0.5, 4.2], [2.4, 4.2], [0.5, 4.2], speed=0.6)
+    (note,) = observe(watched(way, LONG), room_map()).notes
+    assert note.kind == "seen" and "in sight for 33% of the time" in note.text
+
+
+def test_scans_too_far_apart_are_noted():
+    """Twice a second nobody can be followed: that is said, and not that nobody was there."""
+    way = walk([2, 2], [7, 2], [2, 2], rate=2.0)
+    observation = observe(watched(way, rate=2.0), room_map())
+    assert [note.kind for note in observation.notes] == ["slow scans"] and not observation.trusted
+
+
+def test_poses_that_do_not_say_that_the_laser_moves_are_noted():
+    """Walls that seem to move are not on the map and do not stand: the note says so, whoever seems to walk."""
+    y, rng = 3.0 - 2.0 * np.cos(np.linspace(0, 2 * np.pi, 200)), np.random.default_rng(0)
+    world = np.vstack([WALLS, FURNITURE, CANS])
+    ranges = np.array([scan(np.array([4.5, each, np.pi / 2]), world, rng) for each in y])
+    log = LaserLog(0.1 * np.arange(200), ranges, ANGLES, np.tile([4.5, 5.0, np.pi / 2], (200, 1)), 30.0)
+    observation = observe(log, drawn_map([*FURNITURE, *WALLS], WIDTH, DEPTH, border=4.0))
+    assert "map" in [note.kind for note in observation.notes] and not observation.trusted
 
 
 @pytest.mark.parametrize("user", [0, 1, (2.0, 4.5), (7.1, 4.3)])

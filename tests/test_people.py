@@ -81,11 +81,11 @@ def test_which_side_is_hidden_is_told(nearer, hidden):
 
 def test_a_pause_ends_every_piece():
     """Who was in sight before a pause of seconds and stands there after it is followed anew."""
-    followed, body = Followed(), [(3.0, 0.0, 1.0, 0.0, 0.4, 0.05, 0.0)]
-    for k, t in enumerate([0.0, 0.1, 0.2, 0.3, 0.4, 9.0, 9.1, 9.2, 9.3, 9.4]):
-        x, *rest = body[0]
-        followed.step(t, [(x + 0.1 * (k % 5), *rest)])
-    assert [each[:, 0].tolist() for each in followed.pieces()] == [[0, 1, 2, 3, 4], [5, 6, 7, 8, 9]]
+    followed, distance = Followed(), [3.0, 3.2, 3.4, *[3.5] * 20]
+    for begin, way in ((0.0, distance), (9.0, distance[::-1])):
+        for k, x in enumerate(way):
+            followed.step(begin + 0.1 * k, [(x, 0.0, 1.0, 0.0, 0.4, 0.05, 0.0)])
+    assert [each[:, 0].tolist() for each in followed.pieces()] == [[*range(23)], [*range(23, 46)]]
 
 
 # ---- where the middle of somebody is
