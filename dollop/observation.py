@@ -282,7 +282,10 @@ class Observer:
             raise ValueError(f"the background map must cover the scans: {share} lie outside it")
 
     def _map_notes(self):
-        """Whether the map explains the scans."""
+        """Whether the map explains the scans, and whether they are often enough."""
+        period = float(np.median(np.diff(self.followed.t))) if len(self.followed.t) > 1 else 0.0
+        if period > SLOWEST:
+            yield Note("slow scans", f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s")
         share = self.foreground / max(self.returned, 1)
         if share > MOST_FOREGROUND:
             text = f"{share:.0%} of the readings are on nothing that the map knows (at most {MOST_FOREGROUND:.0%})"
@@ -398,7 +401,8 @@ def unlike(box, other):
 
 STANDING_REACH = 0.5
 """m from the middle of somebody within which readings are theirs."""
-MOST_FOREGROUND = 0.5
+MOST_FOREGROUND, SLOWEST = 0.5, 0.35
+"""Share of the readings that the map does not explain, and s between scans, beyond which nothing is sure."""
 FOREGROUND = 1
 
 

@@ -207,10 +207,16 @@ class Followed:
         scan = len(self.t)
         dt = t - self.t[-1] if scan else 0.0
         self.t.append(t)
+        if dt > PATIENCE:
+            self._end(t)  # nothing is known of what happened in a pause
         for piece in self.alive:
             piece.predict(dt, self.noise)
         if found:
             self._match(t, scan, found)
+        self._end(t)
+
+    def _end(self, t):
+        """End the pieces of those who have been out of sight for too long."""
         if self.alive and min(piece.seen for piece in self.alive) < t - PATIENCE:
             self.past += [piece for piece in self.alive if piece.seen < t - PATIENCE and worth_keeping(piece)]
             self.alive = [piece for piece in self.alive if piece.seen >= t - PATIENCE]
@@ -715,14 +721,15 @@ def bridge(t, places, velocities, when, pace):
         halfway = (0.4 * length / speeds[moving]) * velocities[moving]
         directions = np.where(moving[:, None], velocities, chord - halfway if moving[0] else chord + halfway)
     directions = directions / np.maximum(np.hypot(*directions.T), 1e-9)[:, None]
+    if (directions @ chord > STRAIGHT_ON * straight).all():
+        length = min(length, LOITERS * straight)  # who is late on a straight way has stood still
     share = np.linspace(0, 1, 101)[:, None]
 
     def curve(swing):
-        first, last = swing * length * directions
-        leave, reach = share * (1 - share) ** 2 * first, share**2 * (share - 1) * last
-        return places[0] + (3 - 2 * share) * share**2 * chord + leave + reach
+        leave, reach = share * (1 - share) ** 2 * directions[0], share**2 * (share - 1) * directions[1]
+        return places[0] + (3 - 2 * share) * share**2 * chord + swing * (leave + reach)
 
-    low, high = 0.0, MOST_SWING
+    low, high = straight, MOST_SWING * length
     for _ in range(20):
         middle = (low + high) / 2
         low, high = (middle, high) if arc_length(curve(middle))[-1] < length else (low, middle)
@@ -737,6 +744,8 @@ def bridge(t, places, velocities, when, pace):
 
 SLOW, MOST_SWING = 0.25, 4.0
 """m/s below which somebody stands; and by how much more than on a straight way a bridge may swing out."""
+STRAIGHT_ON, LOITERS = 0.7, 1.2
+"""Cosine to the straight way from which on a way leads straight on, and how much longer it then may be."""
 
 
 def fitted_middles(rows, velocities):
