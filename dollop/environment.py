@@ -37,6 +37,18 @@ _CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
 _ROUNDING = 1e-6
 
 
+LINK, SPACINGS = 0.15, 2.2
+"""Cells are of one surface where they are nearer than `LINK` m or than so many beam spacings."""
+FLAT = 0.10
+"""m: a box seen no deeper than this shows one face only."""
+ROUND = 0.22
+"""Share of its extent by which the near corner of a box is empty where what stands there is round."""
+APART, ONE_OBJECT = 0.40, 1.5
+"""m: two surfaces nearer than that are one where no beam passes between, and make no larger box."""
+UNSURE = 0.20
+"""m between beams on a grazed face, from which on its end is not known."""
+
+
 @dataclass(frozen=True, eq=False)
 class Seen:
     """The part of the floor that the laser has seen (beyond the paper).
@@ -279,17 +291,6 @@ def _springs(corners):
 
 
 # ---- boxes of what stands
-
-LINK, SPACINGS = 0.15, 2.2
-"""Cells are of one surface where they are nearer than `LINK` m or than so many beam spacings."""
-FLAT = 0.10
-"""m: a box seen no deeper than this shows one face only."""
-ROUND = 0.22
-"""Share of its extent by which the near corner of a box is empty where what stands there is round."""
-APART, ONE_OBJECT = 0.40, 1.5
-"""m: two surfaces nearer than that are one where no beam passes between, and make no larger box."""
-UNSURE = 0.20
-"""m between beams on a grazed face, from which on its end is not known."""
 
 
 def standing_boxes(places, sensors, step, scan=None, min_area=0.01):

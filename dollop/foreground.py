@@ -13,6 +13,17 @@ import scipy
 from dollop.checks import check_positive
 from dollop.gridmap import flat_cells, in_metres
 
+SLOT = 0.15
+"""s: what stands is looked at no more often, however fast the laser is."""
+LONGEST_STEP = 0.5
+"""s: a pause between scans counts for no more."""
+BEYOND = 0.10
+"""m by which a beam must have gone on behind a cell to have passed it."""
+LEAVING = 0.6
+"""s without a hit after which a cell that beams pass stands no more."""
+TOUCH = 0.06
+"""m round a cell that stands in which a reading belongs to it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Blobs:
@@ -432,17 +443,6 @@ def bounding_boxes(blobs, origin, resolution):
 
 # ---- what stands, remembered in seconds (beyond the paper)
 
-SLOT = 0.15
-"""s: what stands is looked at no more often, however fast the laser is."""
-LONGEST_STEP = 0.5
-"""s: a pause between scans counts for no more."""
-BEYOND = 0.10
-"""m by which a beam must have gone on behind a cell to have passed it."""
-LEAVING = 0.6
-"""s without a hit after which a cell that beams pass stands no more."""
-TOUCH = 0.06
-"""m round a cell that stands in which a reading belongs to it."""
-
 
 class StandingCells:
     """Cells of the map where something stands, and since when (Sec. II, in seconds).
@@ -494,7 +494,17 @@ class StandingCells:
         self.last = None
 
     def due(self, t):
-        """Whether it is time for another look at `t` s."""
+        """Whether it is time for another look.
+
+        Parameters
+        ----------
+        t : float
+            s.
+
+        Returns
+        -------
+        bool
+        """
         return self.last is None or t - self.last >= SLOT
 
     def look(self, t, cells, points, pose, angles, ranges):
@@ -563,7 +573,7 @@ class StandingCells:
 
     @property
     def standing(self):
-        """(S,) rows of the cells where something stands, and has not just gone."""
+        """(S,) int array: rows of the cells where something stands, and has not just gone."""
         leaving = (self.passed > self.until) & (self.until < self.last - LEAVING)
         return np.flatnonzero((self.value > 0.5) & ~leaving)
 
@@ -590,11 +600,33 @@ class SeenFloor:
         self.last = None
 
     def due(self, t):
-        """Whether it is time for another look at `t` s."""
+        """Whether it is time for another look.
+
+        Parameters
+        ----------
+        t : float
+            s.
+
+        Returns
+        -------
+        bool
+        """
         return self.last is None or t - self.last >= self.EVERY
 
     def look(self, t, pose, angles, ranges, farthest=20.0):
-        """Take in one scan; a beam that does not come back is not believed."""
+        """Take in one scan; a beam that does not come back is not believed.
+
+        Parameters
+        ----------
+        t : float
+            s.
+        pose : (3,) float array
+            Sensor x, y in m, theta in rad.
+        angles, ranges : (B,) float arrays
+            The scan.
+        farthest : float
+            m up to which a beam is believed.
+        """
         self.last = t
         back = np.isfinite(ranges) & (ranges < farthest)
         bearings, reach = pose[2] + angles[back], ranges[back]
@@ -606,12 +638,28 @@ class SeenFloor:
         self.first[cells] = np.minimum(self.first[cells], t)
 
     def first_at(self, places):
-        """When, in s, each place (M, 2) was seen first, (M,); `inf` where it never was."""
+        """When a place was seen first.
+
+        Parameters
+        ----------
+        places : (M, 2) float array
+            m.
+
+        Returns
+        -------
+        (M,) float array
+            s; `inf` where it never was.
+        """
         found = np.full(len(places), np.inf)
         cells, inside = flat_cells(places, self.origin, self.resolution, self.shape)
         found[inside] = self.first[cells]
         return found
 
     def grid(self):
-        """(H, W) bool array: seen by now, gaps between beams closed."""
+        """What has been seen by now, gaps between beams closed.
+
+        Returns
+        -------
+        (H, W) bool array
+        """
         return scipy.ndimage.binary_closing(np.isfinite(self.first).reshape(self.shape), np.ones((3, 3)))

@@ -42,6 +42,31 @@ STATIC_EVERY = 5
 """The paper's slow grid looks at every fifth scan: what is static is still there then."""
 METHODS = "people", "paper"
 """How somebody is observed: as people, or as the paper has it, every foreground object alike."""
+SAME_PLACE = 0.25
+"""m: what went and what stands there so near are the same, seen badly."""
+SLIDES = 0.6
+"""m/s up to which who stood before and stands afterwards may be an object that was moved."""
+SHORTEST_LOOK = 1.5
+"""s of scans that it takes to know what stands."""
+MOVED_WITHIN = 5.0
+"""s between the end of an object here and its beginning there for it to be the same."""
+STANDING_REACH = 0.5
+"""m from the middle of somebody within which readings are theirs."""
+MOST_MOVING, SLOWEST = 0.25, 0.35
+"""Share of the readings that are of nothing that stands, and s between scans, beyond which nothing is sure."""
+FOREGROUND = 1
+NOBODY_THERE = 1.5
+"""m from the place named beyond which nobody is meant."""
+LONG_ENOUGH = 0.4
+"""Share of the longest way that the user has walked at least."""
+LEFT_OUT = 0.3
+"""m that somebody who may be the user has walked to be missed."""
+LONGEST_BRIDGE, LEAST_SEEN, TOP_SPEED = 4.5, 0.6, 3.0
+"""s, share and m/s beyond which a walk is in doubt."""
+MAY_COME_BACK = 15.0
+"""s after which nobody is taken for the same."""
+ALIKE = 0.15
+"""m/s by which the user must be faster than others."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +145,7 @@ def observe(log, background, user="fastest", method="people", background_radius=
     if paper:
         raise ValueError(f'{", ".join(paper)} must come with method="paper"')
     observer = Observer(background, log.angles, user, background_radius, min_area)
-    observer.take(log.t, log.ranges, log.poses)
+    observer._take_all(log.t, log.ranges, log.poses)
     return observer.observation(log.notes)
 
 
@@ -156,7 +181,7 @@ class Observer:
         self._class = reading_classes(background, background_radius)
         self.motion, self.followed = Motion(), Followed()
         self.standing, self.floor = StandingCells(background), SeenFloor(background)
-        self.returned = self.foreground = self.outside = 0
+        self.returned = self.outside = self.later = self.moving = 0
         self._scan = None
 
     def step(self, t, ranges, pose):
@@ -182,9 +207,9 @@ class Observer:
         pose, t = checked_array("pose", pose, 3), float(t)
         if not np.isfinite(t) or (self.followed.t and t <= self.followed.t[-1]):
             raise ValueError(f"t must be later than the last scan's {self.followed.t[-1:].tolist()}, got {t}")
-        self.take(np.array([t]), ranges[None], pose[None])
+        self._take_all(np.array([t]), ranges[None], pose[None])
 
-    def take(self, t, ranges, poses):
+    def _take_all(self, t, ranges, poses):
         """Take several scans, as `step` takes one: times (T,), ranges (T, B), poses (T, 3)."""
         poses = np.column_stack([poses[:, :2], poses[:, 2] + self._middle])
         for some in np.array_split(np.arange(len(t)), 1 + ranges.size // 50_000):
@@ -195,8 +220,12 @@ class Observer:
         scan, beam, x, y, cells = self._readings(ranges, poses)
         bounds = np.searchsorted(scan, np.arange(len(t) + 1)).tolist()
         points = np.column_stack([x, y])
+        count = np.isfinite(ranges).sum(axis=1).tolist()
         for i, now in enumerate(t.tolist()):
             part = slice(bounds[i], bounds[i + 1])
+            if self.followed.t and now - self.followed.t[0] > SHORTEST_LOOK:
+                self.later += count[i]
+                self.moving += int((self.standing.known_since[cells[part]] == np.inf).sum())
             here = cells[part]
             self.followed.step(now, self._candidates(beam[part], x[part], y[part], here, ranges[i], poses[i]))
             if self.standing.due(now):
@@ -221,7 +250,6 @@ class Observer:
         self.returned += int(returned.sum())
         self.outside += int((returned & ~inside).sum())
         scan, beam = np.nonzero(kind == FOREGROUND)
-        self.foreground += len(scan)
         return scan, beam, x[scan, beam], y[scan, beam], cells[scan, beam]
 
     def _candidates(self, beam, x, y, cells, ranges, pose):
@@ -286,10 +314,11 @@ class Observer:
         period = float(np.median(np.diff(self.followed.t))) if len(self.followed.t) > 1 else 0.0
         if period > SLOWEST:
             yield Note("slow scans", f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s")
-        share = self.foreground / max(self.returned, 1)
-        if share > MOST_FOREGROUND:
-            text = f"{share:.0%} of the readings are on nothing that the map knows (at most {MOST_FOREGROUND:.0%})"
-            yield Note("map", f"{text}: it does not fit the poses, or the room has changed")
+        share = self.moving / max(self.later, 1)
+        if share > MOST_MOVING:
+            text = f"{share:.0%} of the readings are on nothing that stands or that the map knows"
+            reason = "the map does not fit, or the laser moves and the poses do not say so"
+            yield Note("map", f"{text} (at most {MOST_MOVING:.0%}): {reason}")
 
     def _environment(self, people, user):
         """The objects that stand at the end, and the cells of each."""
@@ -340,16 +369,6 @@ class Observer:
         return self.followed.t[0]
 
 
-SAME_PLACE = 0.25
-"""m: what went and what stands there so near are the same, seen badly."""
-SLIDES = 0.6
-"""m/s up to which who stood before and stands afterwards may be an object that was moved."""
-SHORTEST_LOOK = 1.5
-"""s of scans that it takes to know what stands."""
-MOVED_WITHIN = 5.0
-"""s between the end of an object here and its beginning there for it to be the same."""
-
-
 def arrival(track):
     """When, in s, somebody came to where they stand at the end; -inf if they have always been there."""
     away = track.t[np.linalg.norm(track.positions - track.positions[-1], axis=1) > 0.5]
@@ -397,13 +416,6 @@ def was_there(track, place, begin, end):
 def unlike(box, other):
     """By how much two boxes (4,) differ in size, m."""
     return float(np.abs((box[2:] - box[:2]).max() - (other[2:] - other[:2]).max()))
-
-
-STANDING_REACH = 0.5
-"""m from the middle of somebody within which readings are theirs."""
-MOST_FOREGROUND, SLOWEST = 0.5, 0.35
-"""Share of the readings that the map does not explain, and s between scans, beyond which nothing is sure."""
-FOREGROUND = 1
 
 
 def reading_classes(background, radius):
@@ -456,12 +468,6 @@ def choose(people, user):
     return k
 
 
-NOBODY_THERE = 1.5
-"""m from the place named beyond which nobody is meant."""
-LONG_ENOUGH = 0.4
-"""Share of the longest way that the user has walked at least."""
-
-
 def fastness(people):
     """(K,) speeds in m/s, 0 for those whose way is short beside the longest."""
     ways = np.array([arc_length(track.positions)[-1] for track in people])
@@ -494,24 +500,12 @@ def user_notes(user, person, people, tracks, choice):
         yield Note("speed", f"the user would have walked at {user.speeds.max():.1f} m/s (at most {TOP_SPEED:g})")
 
 
-LEFT_OUT = 0.3
-"""m that somebody who may be the user has walked to be missed."""
-LONGEST_BRIDGE, LEAST_SEEN, TOP_SPEED = 4.5, 0.6, 3.0
-"""s, share and m/s beyond which a walk is in doubt."""
-MAY_COME_BACK = 15.0
-"""s after which nobody is taken for the same."""
-
-
 def could_be(user, other):
     """Seconds between the times of two tracks of which one may go on as the other, or None."""
     first, second = (user, other) if user.t[0] < other.t[0] else (other, user)
     gap = second.t[0] - first.t[-1]
     apart = np.linalg.norm(second.positions[0] - first.positions[-1])
     return max(gap, 0.0) if -OVERLAP < gap < MAY_COME_BACK and apart < REACH * max(gap, 0) + SLACK else None
-
-
-ALIKE = 0.15
-"""m/s by which the user must be faster than others."""
 
 
 def observe_as_paper(

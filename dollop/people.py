@@ -31,8 +31,13 @@ from dollop.tracking import Motion, Track, smooth
 from dollop.trajectory import arc_length, at_arc_length
 
 __all__ = [
+    "BRIDGED",
     "Followed",
+    "MOVED",
+    "OVERLAP",
     "Person",
+    "REACH",
+    "SLACK",
     "candidates",
     "joined",
     "moving_speed",
@@ -71,6 +76,39 @@ OFTEN = 0.4
 ROW = 8
 """Numbers kept of a measurement: scan, x, y of the near side, sight (2), width, standard deviation,
 and the side that something nearer hides: 1 left, -1 right, 2 both, 0 none."""
+STOOD_LINK, WIDE = 0.35, 0.75
+"""m: cells so near to each other stood and went together; what is wider than that is nobody."""
+BEGAN = 1.0
+"""s: who begins to walk so soon before or after what stood there was seen last is who stood there."""
+ON, STAYS = 0.20, 0.5
+"""m, and a quarter of its width, from a cell that stands within which a measurement is of what
+stands; and s that it goes on to."""
+LONGEST_GAP, REACH, SLACK = 6.0, 2.0, 0.5
+"""s, m/s and m: a gap between pieces is bridged up to so long, where the way can be walked so fast,
+and a little more."""
+PRIOR = 3.0
+"""Log odds, before anything is seen, that who comes into sight is who was last seen."""
+DOUBTFUL = 2.0
+"""Log odds over the next best assignment below which a joint is not made."""
+END_SD, END_SPEED_SD = 1.3, 0.3
+"""How much worse than its measurements the place at the end of a piece is known, and its velocity in m/s."""
+TURNS, ABRUPT = 0.1, 10.0
+"""Share of the joints at which somebody turns sharply, and how much more noise that is."""
+CLOSE, BESIDE = 0.8, 0.6
+"""m from somebody out of sight within which another may be taken for them; and within which both
+may be one candidate."""
+OVERLAP = 0.5
+"""s that somebody may be followed on, wrongly, after they have come into sight elsewhere."""
+SHORT_GAP = 0.15
+"""s: who is out of sight for less cannot be confused."""
+MOMENT = 0.8
+"""s over which the velocity of somebody badly seen is taken."""
+BRIDGED = 0.5
+"""s out of sight from which on what is between is a bridge."""
+SLOW, MOST_SWING = 0.25, 4.0
+"""m/s below which somebody stands; and by how much more than on a straight way a bridge may swing out."""
+STRAIGHT_ON, LOITERS = 0.7, 1.2
+"""Cosine to the straight way from which on a way leads straight on, and how much longer it then may be."""
 
 
 def candidates(beam, x, y, ranges, pose, step):
@@ -191,7 +229,12 @@ class Followed:
         self.t, self.alive, self.past, self.now = array("d"), [], [], None
 
     def standing(self):
-        """Pieces of those who walked and may be standing now."""
+        """Those who walked and may be standing now.
+
+        Returns
+        -------
+        list of Piece
+        """
         return [piece for piece in self.alive if piece.far > MOVED]
 
     def step(self, t, found):
@@ -251,7 +294,15 @@ class Followed:
             self.alive.append(piece)
 
     def pieces(self):
-        """Measurements of every piece, list of (n, 8) float arrays in the order of their beginning."""
+        """Measurements of every piece that may be of somebody's way.
+
+        Returns
+        -------
+        list of (n, 8) float arrays
+            In the order of their beginning; the columns are: scan, x, y of the near side in m, sight
+            (2), width and standard deviation in m, and the side that something nearer hides, 1 left,
+            -1 right, 2 both, 0 none.
+        """
         kept = self.past + [piece for piece in self.alive if worth_keeping(piece)]
         rows = [np.frombuffer(piece.rows).reshape(-1, ROW).copy() for piece in kept]
         return sorted(rows, key=lambda each: each[0, 0])
@@ -264,14 +315,6 @@ def worth_keeping(piece):
 
 
 # ---- what stood, and who walked from there
-
-STOOD_LINK, WIDE = 0.35, 0.75
-"""m: cells so near to each other stood and went together; what is wider than that is nobody."""
-BEGAN = 1.0
-"""s: who begins to walk so soon before or after what stood there was seen last is who stood there."""
-ON, STAYS = 0.20, 0.5
-"""m, and a quarter of its width, from a cell that stands within which a measurement is of what
-stands; and s that it goes on to."""
 
 
 def stood(gone, pieces, t, step):
@@ -298,7 +341,17 @@ def stood(gone, pieces, t, step):
 
 
 def together(gone):
-    """Cells (G, 6) that stood and went together, a list of arrays."""
+    """Cells that stood and went together.
+
+    Parameters
+    ----------
+    gone : (G, 6) float array
+        Cells where something stood and is no more: place and sensor in m, since and until in s.
+
+    Returns
+    -------
+    list of (G_k, 6) float arrays
+    """
     if not len(gone):
         return []
     pairs = scipy.spatial.cKDTree(gone[:, :2]).query_pairs(STOOD_LINK, output_type="ndarray")
@@ -373,25 +426,6 @@ def off_standing(pieces, stood, t):
 
 
 # ---- pieces of one person's way
-
-LONGEST_GAP, REACH, SLACK = 6.0, 2.0, 0.5
-"""s, m/s and m: a gap between pieces is bridged up to so long, where the way can be walked so fast,
-and a little more."""
-PRIOR = 3.0
-"""Log odds, before anything is seen, that who comes into sight is who was last seen."""
-DOUBTFUL = 2.0
-"""Log odds over the next best assignment below which a joint is not made."""
-END_SD, END_SPEED_SD = 1.3, 0.3
-"""How much worse than its measurements the place at the end of a piece is known, and its velocity in m/s."""
-TURNS, ABRUPT = 0.1, 10.0
-"""Share of the joints at which somebody turns sharply, and how much more noise that is."""
-CLOSE, BESIDE = 0.8, 0.6
-"""m from somebody out of sight within which another may be taken for them; and within which both
-may be one candidate."""
-OVERLAP = 0.5
-"""s that somebody may be followed on, wrongly, after they have come into sight elsewhere."""
-SHORT_GAP = 0.15
-"""s: who is out of sight for less cannot be confused."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -664,10 +698,6 @@ def way_at(t, places, end):
     return (places[last] - places[first]) / max(t[last] - t[first], 1e-9)
 
 
-MOMENT = 0.8
-"""s over which the velocity of somebody badly seen is taken."""
-
-
 def surely(part, t, sd, first, last):
     """A stretch in sight (n,) without what is vague at its first or last moments, if much is left."""
     good = part[sd[part] < VAGUE]
@@ -675,10 +705,6 @@ def surely(part, t, sd, first, last):
         return part
     begin, end = good[0] if first else part[0], good[-1] if last else part[-1]
     return part[(part >= begin) & (part <= end)]
-
-
-BRIDGED = 0.5
-"""s out of sight from which on what is between is a bridge."""
 
 
 def bridge(t, places, velocities, when, pace):
@@ -707,8 +733,8 @@ def bridge(t, places, velocities, when, pace):
     --------
     Who goes behind a box and comes back on the other side of it has walked round it:
 
-    >>> back = bridge(np.array([0.0, 3.0]), np.array([[0.0, 0.0], [0.0, 0.5]]), np.array([[1.0, 0], [-1.0, 0]]), [1.5], 1.0)
-    >>> back[0].round(1)
+    >>> there, ways = np.array([[0.0, 0.0], [0.0, 0.5]]), np.array([[1.0, 0.0], [-1.0, 0.0]])
+    >>> bridge(np.array([0.0, 3.0]), there, ways, [1.5], pace=1.0)[0].round(1)
     array([[1.3, 0.2]])
     """
     seconds, chord = t[1] - t[0], places[1] - places[0]
@@ -740,12 +766,6 @@ def bridge(t, places, velocities, when, pace):
     ahead = at_arc_length(points, along + 0.01) - at_arc_length(points, along - 0.01)
     ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     return positions, walked[-1] / seconds * ahead
-
-
-SLOW, MOST_SWING = 0.25, 4.0
-"""m/s below which somebody stands; and by how much more than on a straight way a bridge may swing out."""
-STRAIGHT_ON, LOITERS = 0.7, 1.2
-"""Cosine to the straight way from which on a way leads straight on, and how much longer it then may be."""
 
 
 def fitted_middles(rows, velocities):
@@ -784,6 +804,16 @@ def half_axes(rows, velocities):
 
 
 def moving_speed(track):
-    """Median speed in m/s while somebody moves, 0 for who never does."""
+    """How fast somebody walks.
+
+    Parameters
+    ----------
+    track : Track
+
+    Returns
+    -------
+    float
+        Median speed in m/s while they move and are in sight, 0 for who never does.
+    """
     moving = track.speeds[~track.occluded & (track.speeds > 0.25)]
     return float(np.median(moving)) if len(moving) else 0.0
