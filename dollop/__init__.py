@@ -21,6 +21,9 @@ II                occluded; disappeared after 5 seconds         `Tracker.disappe
 II                user: the fastest foreground object           `tracking.identify_user`
 II                people, each as far as it is surely the same  `people`
 II                what stands, and since when                   `foreground.StandingCells`
+II                people, user, environment of a log            `observe`
+II                the same, scan by scan                        `Observer`
+                  what may be wrong with a result, and why      `Note`
 III   p_n         position on a trajectory                      `trajectory`
 III               laps: walks along one trajectory              `laps`
 III   x_n         position relative to a segment's subgoal      `LDS.step`
