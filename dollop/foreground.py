@@ -13,6 +13,10 @@ import scipy
 from dollop.checks import check_positive
 from dollop.gridmap import flat_cells, in_metres
 
+_PLACE, _SENSOR, _SINCE, _UNTIL, _STOOD = slice(0, 2), slice(2, 4), 4, 5, slice(0, 6)
+_VALUE, _PASSED, _LOOKS, _COLUMNS = 6, 7, 8, 9
+LONG_MEAN = 50
+"""Looks over which the mean of a cell's readings is taken."""
 SLOT = 0.15
 """s: what stands is looked at no more often, however fast the laser is."""
 LONGEST_STEP = 0.5
@@ -461,37 +465,40 @@ class StandingCells:
 
     Attributes
     ----------
-    cells : (A,) int array
-        Flat indices of the cells that are remembered.
-    value, since, until, passed : (A,) float arrays
-        v, and the times in s of the first and the last hit, and when a beam last passed.
-    places, sensors : (A, 2) float arrays
-        Mean of the readings in a cell, and where it was seen from last, m.
     known_since : (H * W,) float array
         At each cell, and `TOUCH` m round it, since when in s something stands there, else `inf`.
     gone : dict of int to (6,) tuple
         By cell where something stood and is no more: place (2) and sensor (2) in m, since, until.
-    """
 
-    COLUMNS = "cells", "value", "since", "until", "passed", "places", "sensors", "looks"
+    Examples
+    --------
+    What is hit for longer than 1.2 s stands there, whether it is looked at five or fifty times:
+
+    >>> from dollop.gridmap import OccupancyGrid
+    >>> background = OccupancyGrid(np.zeros((1, 30)), (0.0, 0.0), 0.1)
+    >>> pose, angles = np.array([0.0, 0.05, 0.0]), np.array([-0.1, 0.0, 0.1])
+    >>> for looks in (5, 50):
+    ...     stands = StandingCells(background)
+    ...     for t in np.linspace(0, 1.6, looks):
+    ...         if stands.due(t):
+    ...             stands.look(t, np.array([8]), np.array([[0.85, 0.05]]), pose, angles, np.full(3, 0.85))
+    ...     stands.standing()
+    array([[0.85, 0.05, 0.  , 0.05, 0.  ,  inf]])
+    array([[0.85, 0.05, 0.  , 0.05, 0.  ,  inf]])
+    """
 
     def __init__(self, background, after=1.2):
         check_positive("after", after)
         self.tau = after / np.log(2)
-        self.shape, self.resolution = background.occupancy.shape, background.resolution
-        self.origin = np.asarray(background.origin, dtype=float)
-        self.cells, self.value = np.zeros(0, np.intp), np.zeros(0)
-        self.since, self.until, self.passed = np.zeros(0), np.zeros(0), np.zeros(0)
-        self.places, self.sensors, self.looks = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0)
-        size = self.shape[0] * self.shape[1]
-        self._row = np.full(size, -1, np.int32)
-        self.known_since = np.full(size, np.inf)
-        self._known = np.zeros(0, np.intp)
-        reach = max(1, round(TOUCH / self.resolution))
+        size = background.occupancy.size
+        self._row = np.full(size, -1, np.int32)  # of the table, for each cell of the map
+        self._cells, self._table = np.zeros(256, np.intp), np.zeros((256, _COLUMNS))
+        self._count, self.last = 0, None
+        reach = max(1, round(TOUCH / background.resolution))
         near = np.arange(-reach, reach + 1)
-        self._round = (near[:, None] * self.shape[1] + near).ravel()
+        self._round = (near[:, None] * background.occupancy.shape[1] + near).ravel()
+        self.known_since, self._marked, self._known = np.full(size, np.inf), None, np.zeros(0, np.intp)
         self.gone = {}
-        self.last = None
 
     def due(self, t):
         """Whether it is time for another look.
@@ -524,58 +531,86 @@ class StandingCells:
             The scan.
         """
         dt = SLOT if self.last is None else min(t - self.last, LONGEST_STEP)
-        self.last = t
-        gain = 1 - np.exp(-dt / self.tau)
-        hit, inverse = np.unique(cells, return_inverse=True)
-        count = np.bincount(inverse, minlength=len(hit))
-        means = np.column_stack([np.bincount(inverse, column, len(hit)) for column in points.T]) / count[:, None]
-        fresh = self._row[hit] < 0
-        if fresh.any():
-            self._remember(hit[fresh], t)
-        rows = self._row[hit]
-        self.looks[rows] += 1
-        self.places[rows] += (means - self.places[rows]) / np.minimum(self.looks[rows], 50)[:, None]
-        self.sensors[rows], self.until[rows] = pose[:2], t
-        free = seen_free(self.places, pose, angles, ranges, BEYOND)
+        self.last, gain = t, 1 - np.exp(-dt / self.tau)
+        rows = self._row[cells]
+        if (fresh := rows < 0).any():
+            self._remember(np.unique(cells[fresh]), t)
+            rows = self._row[cells]
+        table = self._table[: self._count]
+        table[rows, _LOOKS] += 1
+        weight = 1 / np.minimum(table[rows, _LOOKS], LONG_MEAN)
+        table[rows, _PLACE] += (points - table[rows, _PLACE]) * weight[:, None]
+        table[rows, _SENSOR], table[rows, _UNTIL] = pose[:2], t
+        free = seen_free(table[:, _PLACE], pose, angles, ranges, BEYOND)
         free[rows] = False
-        before = self.value > 0.5
-        self.value[free] -= gain * self.value[free]
-        self.passed[free] = t
-        self.value[rows] += gain * (1 - self.value[rows])
-        ended = np.flatnonzero(before & (self.value <= 0.5))
-        for k in ended.tolist():
-            when = float(self.since[k]), float(self.until[k])
-            self.gone[int(self.cells[k])] = (*self.places[k].tolist(), *self.sensors[k].tolist(), *when)
-        forgotten = free & (self.value < 0.5 * gain)
-        if forgotten.any():
-            self._row[self.cells[forgotten]] = -1
-            for name in self.COLUMNS:
-                setattr(self, name, getattr(self, name)[~forgotten])
-            self._row[self.cells] = np.arange(len(self.cells))
+        before = table[:, _VALUE].copy()
+        table[free, _VALUE] *= 1 - gain
+        table[free, _PASSED] = t
+        table[rows, _VALUE] = before[rows] + gain * (1 - before[rows])
+        for k in np.flatnonzero((before > 0.5) & (table[:, _VALUE] <= 0.5)).tolist():
+            self.gone[int(self._cells[k])] = tuple(table[k, _STOOD].tolist())
+        self._forget(free & (table[:, _VALUE] < 0.5 * gain))
         self._mark()
 
     def _remember(self, cells, t):
         """Add cells (M,), seen for the first time at `t` s."""
-        n, none = len(cells), np.zeros(len(cells))
-        self._row[cells] = len(self.cells) + np.arange(n)
-        new = cells, none, np.full(n, t), np.full(n, t), np.full(n, -np.inf), np.zeros((n, 2)), np.zeros((n, 2)), none
-        for name, values in zip(self.COLUMNS, new, strict=True):
-            setattr(self, name, np.concatenate([getattr(self, name), values]))
+        count = self._count + len(cells)
+        if count > len(self._cells):
+            self._cells = np.resize(self._cells, 2 * count)
+            self._table = np.resize(self._table, (2 * count, _COLUMNS))
+        new = slice(self._count, count)
+        self._cells[new], self._table[new] = cells, 0.0
+        self._table[new, _SINCE], self._table[new, _PASSED] = t, -np.inf
+        self._row[cells] = np.arange(self._count, count)
+        self._count = count
+
+    def _forget(self, rows):
+        """Forget cells (A,) bool, once they are many."""
+        if 4 * np.count_nonzero(rows) <= self._count:
+            return
+        self._row[self._cells[: self._count][rows]] = -1
+        kept = np.flatnonzero(~rows)
+        self._count = len(kept)
+        self._cells[: self._count], self._table[: self._count] = self._cells[kept], self._table[kept]
+        self._row[self._cells[: self._count]] = np.arange(self._count)
 
     def _mark(self):
         """Write down at each cell round one that stands since when."""
+        standing = np.flatnonzero(self._table[: self._count, _VALUE] > 0.5)
+        cells, since = self._cells[standing], self._table[standing, _SINCE]
+        now_standing = np.column_stack([cells, since])
+        if self._marked is not None and np.array_equal(now_standing, self._marked):
+            return
         self.known_since[self._known] = np.inf
-        standing = np.flatnonzero(self.value > 0.5)
-        standing = standing[np.argsort(-self.since[standing])]  # the earliest is written last
-        near = (self.cells[standing, None] + self._round).clip(0, self.known_since.size - 1)
-        self._known = near.ravel()
-        self.known_since[self._known] = np.repeat(self.since[standing], len(self._round))
+        order = np.argsort(-since, kind="stable")  # the earliest is written last
+        near = (cells[order, None] + self._round).clip(0, self.known_since.size - 1)
+        self._marked, self._known = now_standing, near.ravel()
+        self.known_since[self._known] = np.repeat(since[order], len(self._round))
 
-    @property
     def standing(self):
-        """(S,) int array: rows of the cells where something stands, and has not just gone."""
-        leaving = (self.passed > self.until) & (self.until < self.last - LEAVING)
-        return np.flatnonzero((self.value > 0.5) & ~leaving)
+        """Where something stands, and has not just gone.
+
+        Returns
+        -------
+        (S, 6) float array
+            Of each cell: mean of its readings and where it was seen from, x, y in m; since when in s;
+            and `inf`, as it has no end.
+        """
+        table = self._table[: self._count]
+        leaving = (table[:, _PASSED] > table[:, _UNTIL]) & (table[:, _UNTIL] < self.last - LEAVING)
+        found = table[(table[:, _VALUE] > 0.5) & ~leaving][:, _STOOD]
+        found[:, -1] = np.inf
+        return found
+
+    def stood(self):
+        """Where something stood, and is no more.
+
+        Returns
+        -------
+        (G, 6) float array
+            As `standing`, and until when in s.
+        """
+        return np.array(list(self.gone.values())).reshape(-1, 6)
 
 
 class SeenFloor:

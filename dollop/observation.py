@@ -236,6 +236,8 @@ class Observer:
 
     def _readings(self, ranges, poses):
         """Foreground readings: scan, beam, x, y in m and flat cell of each, all (n,)."""
+        returned = np.isfinite(ranges)
+        ranges = np.where(returned, ranges, np.nan)
         cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
         ahead, left = self._directions
         x = poses[:, :1] + ranges * (cos * ahead - sin * left)
@@ -246,7 +248,6 @@ class Observer:
         column, row = np.where(inside, column, 0).astype(np.intp), np.where(inside, row, 0).astype(np.intp)
         cells = row * width + column
         kind = np.where(inside, self._class[cells], 0)
-        returned = np.isfinite(ranges)
         self.returned += int(returned.sum())
         self.outside += int((returned & ~inside).sum())
         scan, beam = np.nonzero(kind == FOREGROUND)
@@ -283,10 +284,8 @@ class Observer:
         self._check_map()
         t = np.array(self.followed.t)
         area = float(np.clip(self.background.free.sum() * self.background.resolution**2, 5.0, 200.0))
-        cells, rows = self.standing, self.standing.standing
-        gone = np.array(list(cells.gone.values())).reshape(-1, 6)
-        stands = np.column_stack([cells.places[rows], cells.since[rows], np.full(len(rows), np.inf)])
-        pieces = off_standing(self.followed.pieces(), np.vstack([stands, gone[:, [0, 1, 4, 5]]]), t)
+        stands, gone = self.standing.standing(), self.standing.stood()
+        pieces = off_standing(self.followed.pieces(), np.vstack([stands, gone]), t)
         standing = stood(gone, pieces, t, self.step_angle)
         pieces = sorted(standing + pieces, key=lambda each: each[0, 0])
         persons = joined(pieces, t, area, self.background.way_length, self.motion)
@@ -296,8 +295,8 @@ class Observer:
         chosen = choose(people, self.user)
         user = None if chosen is None else people[chosen]
         who = None if chosen is None else persons[walked[chosen]]
-        environment, groups = self._environment(people, user)
-        notes = (*notes, *self._map_notes(), *self._object_notes(environment, groups, gone, people))
+        environment, groups = self._environment(stands, people, user)
+        notes = (*notes, *self._map_notes(), *self._object_notes(environment, groups, stands, gone, people))
         if user is not None:
             notes += tuple(user_notes(user, who, people, tracks, self.user))
         losses = 0 if who is None else len(who.gaps)
@@ -320,29 +319,26 @@ class Observer:
             reason = "the map does not fit, or the laser moves and the poses do not say so"
             yield Note("map", f"{text} (at most {MOST_MOVING:.0%}): {reason}")
 
-    def _environment(self, people, user):
-        """The objects that stand at the end, and the cells of each."""
-        cells, rows, now = self.standing, self.standing.standing, self.followed.t[-1]
+    def _environment(self, stands, people, user):
+        """The objects that stand at the end, and the cells (S_k, 6) of each."""
         for track in people:
             since = arrival(track)
-            if track.t[-1] > now - 1.0 and (track is user or not slides(track)):
-                there = np.linalg.norm(cells.places[rows] - track.positions[-1], axis=1) < STANDING_REACH
-                rows = rows[~(there & (cells.since[rows] >= since - 0.5))]
-        boxes, assumed, hidden, groups = standing_boxes(
-            cells.places[rows], cells.sensors[rows], self.step_angle, self._scan, self.min_area
-        )
+            if track.t[-1] > self.followed.t[-1] - 1.0 and (track is user or not slides(track)):
+                there = np.linalg.norm(stands[:, :2] - track.positions[-1], axis=1) < STANDING_REACH
+                stands = stands[~(there & (stands[:, 4] >= since - 0.5))]
+        found = standing_boxes(stands[:, :2], stands[:, 2:4], self.step_angle, self._scan, self.min_area)
+        boxes, assumed, hidden, groups = found
         seen = Seen(self.floor.grid(), self.floor.origin, self.floor.resolution)
-        return Environment(boxes, seen, assumed), [rows[each] for each in groups]
+        return Environment(boxes, seen, assumed), [stands[rows] for rows in groups]
 
-    def _object_notes(self, environment, groups, gone, people):
+    def _object_notes(self, environment, groups, stands, gone, people):
         """What came, went or moved meanwhile, and what was seen too shortly or in part."""
         begin, now = self.followed.t[0], self.followed.t[-1]
         if now - begin < SHORTEST_LOOK:
             text = f"the scans last {now - begin:.1f} s: what stands is known after {SHORTEST_LOOK:g} s"
             yield Note("short look", text)
-        stands = self.standing.places[self.standing.standing]
         came = {k: when for k, rows in enumerate(groups) if (when := self._came(rows, gone)) > begin + SHORTEST_LOOK}
-        for place, box, when in went(gone, stands, people, self.min_area):
+        for place, box, when in went(gone, stands[:, :2], people, self.min_area):
             near = [k for k in came if abs(came[k] - when) < MOVED_WITHIN]
             to = min(near, key=lambda k: unlike(environment.boxes[k], box), default=None)
             what = f"an object at ({place[0]:.2f}, {place[1]:.2f})"
@@ -360,9 +356,9 @@ class Observer:
                 "object came", f"an object stands at ({x:.2f}, {y:.2f}) since {when - begin:.1f} s after the start"
             )
 
-    def _came(self, rows, gone):
-        """Since when an object stands whose place had been seen free before; else the beginning."""
-        places, since = self.standing.places[rows], np.quantile(self.standing.since[rows], 0.1)
+    def _came(self, cells, gone):
+        """Since when an object of cells (S, 6) stands whose place had been seen free; else the beginning."""
+        places, since = cells[:, :2], np.quantile(cells[:, 4], 0.1)
         before = nearest(gone[:, :2], places) < SAME_PLACE
         if np.median(self.floor.first_at(places)) < since - 0.5 and not (gone[before, 4] < since - 0.5).any():
             return float(since)

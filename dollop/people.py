@@ -64,7 +64,7 @@ GATE, GATE_MIN, GATE_MAX = 3.0, 0.45, 1.0
 """Standard deviations, and bounds in m, within which a candidate is taken for who was expected."""
 AT_ONCE, FASTEST = 0.35, 3.0
 """m, and m/s: nobody is farther from where they were seen last; more is another one who was hidden."""
-PATIENCE = 0.6
+PATIENCE = 1.0
 """s out of sight after which a piece ends: what comes then is for `joined` to say."""
 ALONE = 0.65
 """m round somebody in which a narrow candidate is not somebody new."""
@@ -90,8 +90,8 @@ PRIOR = 3.0
 """Log odds, before anything is seen, that who comes into sight is who was last seen."""
 DOUBTFUL = 2.0
 """Log odds over the next best assignment below which a joint is not made."""
-END_SD, END_SPEED_SD = 1.3, 0.3
-"""How much worse than its measurements the place at the end of a piece is known, and its velocity in m/s."""
+END_SD = 1.3
+"""How much worse than its measurements the place at the end of a piece is known."""
 TURNS, ABRUPT = 0.1, 10.0
 """Share of the joints at which somebody turns sharply, and how much more noise that is."""
 CLOSE, BESIDE = 0.8, 0.6
@@ -364,12 +364,12 @@ def together(gone):
 def followed_there(group, pieces, t):
     """Whether a piece was where a group of cells (G, 6) stood for most of that time."""
     begin, end = group[:, 4].min(), np.median(group[:, 5])
+    when = np.linspace(begin, end, 20)
     for rows in pieces:
-        when = t[rows[:, 0].astype(int)]
-        there = (
-            (when >= begin) & (when <= end) & (np.linalg.norm(rows[:, 1:3] - group[:, :2].mean(axis=0), axis=1) < ALONE)
-        )
-        if there.any() and np.ptp(when[there]) > 0.7 * (end - begin):
+        lived = t[rows[:, 0].astype(int)]
+        there = np.column_stack([np.interp(when, lived, rows[:, axis]) for axis in (1, 2)])
+        near = np.linalg.norm(there - group[:, :2].mean(axis=0), axis=1) < ALONE
+        if (near & (when >= lived[0] - 0.1) & (when <= lived[-1] + 0.1)).mean() > 0.7:
             return True
     return False
 
@@ -400,8 +400,8 @@ def off_standing(pieces, stood, t):
     Parameters
     ----------
     pieces : list of (n, 8) float arrays
-    stood : (S, 4) float array
-        Cells where something stands or stood: place in m, since and until in s.
+    stood : (S, 6) float array
+        Cells where something stands or stood: place and sensor in m, since and until in s.
     t : (T,) float array
         Time of each scan in s.
 
@@ -416,7 +416,7 @@ def off_standing(pieces, stood, t):
         when = t[rows[:, 0].astype(int)]
         on = np.zeros(len(rows), bool)
         for k, cells in enumerate(tree.query_ball_point(rows[:, 1:3], ON + rows[:, 5] / 4)):
-            on[k] = ((stood[cells, 2] <= when[k] + 0.1) & (stood[cells, 3] >= when[k] + STAYS)).any()
+            on[k] = ((stood[cells, 4] <= when[k] + 0.1) & (stood[cells, 5] >= when[k] + STAYS)).any()
             if not on[k]:
                 break
         first = int(on.sum())
@@ -522,9 +522,18 @@ def ends_of(rows, t, motion):
     for part in (slice(0, 12), slice(-12, None)):
         place, velocity = smooth(t[scans[part]], middles_of(rows[part]), motion, rows[part, 6])
         k = 0 if part.start == 0 else -1
-        sd = END_SD * rows[part, 6].mean()
-        states.append((t[scans[part]][k], place[k], velocity[k], np.diag([sd**2, END_SPEED_SD**2])))
+        states.append((t[scans[part]][k], place[k], velocity[k], end_covariance(rows[part, 6], t[scans[part]], motion)))
     return states
+
+
+def end_covariance(sd, t, motion):
+    """Covariance (2, 2), in m and m/s, of the state at the end of a piece.
+
+    That of a Kalman filter that has settled, of noise q with measurements of variance r every dt:
+    the velocity has sqrt(2) q^(3/4) (r dt)^(1/4).
+    """
+    r, dt = np.mean(sd) ** 2, max(float(np.median(np.diff(t))), 1e-3)
+    return np.diag([END_SD**2 * r, np.sqrt(2) * motion.noise**0.75 * (r * dt) ** 0.25])
 
 
 def log_odds(last, first, area, way, motion):
