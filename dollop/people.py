@@ -309,9 +309,9 @@ class Followed:
 
 
 def worth_keeping(piece):
-    """Whether a piece may be of somebody's way: seen often enough, and not all in one place."""
+    """Whether a piece may be of somebody's way: seen often enough."""
     n, scans = len(piece.rows) // ROW, piece.rows[-ROW] - piece.rows[0] + 1
-    return n >= 4 and n >= OFTEN * scans and piece.far > 0.25
+    return n >= 4 and n >= OFTEN * scans
 
 
 # ---- what stood, and who walked from there
