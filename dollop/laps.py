@@ -20,6 +20,8 @@ GATE_WIDTH = 4.0  # half the gate's width, in median distances between one lap a
 GATE_SLACK = 0.02  # share of a lap over which a direction is taken, and that a last lap may lack
 STRAIGHT = 0.5  # a gate needs a direction: distance made good, as a share of the way walked there
 
+MOST_LOST = 100  # how many times as long as its samples a track may last: else it is the clock that jumped
+
 
 def lap_lag(track):
     """After how many samples a track repeats itself, 0 if it does not.
@@ -89,7 +91,7 @@ def laps(t, positions):
     Raises
     ------
     ValueError
-        A clock that does not increase, or no trajectory (see `check_trajectory`).
+        A clock that does not increase, or jumps by far, or no trajectory (see `check_trajectory`).
 
     Examples
     --------
@@ -101,6 +103,9 @@ def laps(t, positions):
     if t.shape != (len(points),) or not (np.diff(t) > 0).all():
         raise ValueError(f"t must increase and hold one time per position, got shape {t.shape} for {len(points)}")
     period = np.median(np.diff(t))
+    if np.ptp(t) > MOST_LOST * len(t) * period:
+        text = f"t must not jump, got {np.ptp(t):g} s for {len(t)} positions"
+        raise ValueError(f"{text}, most of them {period:.3g} s apart")
     even = t[0] + period * np.arange(int((t[-1] - t[0]) / period + 1.5))
     points = np.stack([np.interp(even, t, column) for column in points.T], axis=1)
     cuts = lap_cuts(points)

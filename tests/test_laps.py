@@ -105,3 +105,10 @@ def test_a_clock_that_runs_backwards():
     for t in (clock[::-1], np.zeros(50), clock[:-1], clock - once, clock - 1.3 * once):
         with pytest.raises(ValueError, match="t must increase"):
             laps(t, track)
+
+
+def test_a_clock_that_jumps_by_years_is_refused():
+    """Nothing is laid out per second of a time in which nobody was seen."""
+    t = np.arange(200) / 10 + 1e9 * (np.arange(200) >= 100)
+    with pytest.raises(ValueError, match=r"t must not jump, got 1e\+09 s for 200 positions, most of them 0.1 s apart"):
+        laps(t, eight(3, 200))
