@@ -11,7 +11,7 @@ CARMEN_SUFFIXES = (".log", ".log.gz", ".clf", ".clf.gz")
 ROS_SUFFIXES = (".bag", ".mcap", ".db3")
 
 
-def read_log(path, topic=None):
+def read_log(path, topic=None, fov=None):
     """Read a laser log, in the format that its name says.
 
     Parameters
@@ -24,18 +24,22 @@ def read_log(path, topic=None):
         `dataclasses.replace(log, poses=poses)`.
     topic : str, optional
         Which topic of a ROS bag; needed only if several carry laser scans.
+    fov : float, optional
+        Field of view in rad, for files that do not state it: those with FLASER lines of CARMEN. The
+        first beam is at -fov/2, the last at +fov/2. By default what CARMEN takes it for.
 
     Returns
     -------
     LaserLog
-        `inf` where nothing came back, beam 0 rightmost.
+        `inf` where nothing came back, beam 0 rightmost; its notes say what had to be guessed.
 
     Raises
     ------
     FormatError
         If the file is not what its name says, or the name says nothing.
     ValueError
-        If a topic is asked of a CARMEN log, which has none.
+        If a topic is asked of a CARMEN log, which has none, or a field of view is told of a file that
+        states it.
     FileNotFoundError
         If there is no such file.
     """
@@ -43,11 +47,13 @@ def read_log(path, topic=None):
     if not path.exists():
         raise FileNotFoundError(f"no such file: {path}")
     if path.is_dir() or path.name.endswith(ROS_SUFFIXES):
+        if fov is not None:
+            raise ValueError(f"{path}: a ROS bag states its field of view, got fov={fov!r}")
         return ros_bag.read_log(path, topic)
     _check_is_carmen(path)
     if topic is not None:
         raise ValueError(f"a CARMEN log has no topics, got topic={topic!r}")
-    return carmen_log.read_log(path)
+    return carmen_log.read_log(path, fov=fov)
 
 
 def write_log(path, log):

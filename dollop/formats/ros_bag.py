@@ -6,7 +6,7 @@ import numpy as np
 
 from dollop.checks import need
 from dollop.formats.files import FormatError, from_file, warn_of
-from dollop.formats.scans import Beams, Scan, usable_scans
+from dollop.formats.scans import Beams, Scan, no_return_from, usable_scans
 from dollop.laser import LaserLog
 
 __all__ = ["read_log"]
@@ -24,7 +24,8 @@ def read_log(path, topic=None):
     origin. If it moved, give the log the poses that your localisation found:
     `dataclasses.replace(log, poses=poses)`. Ranges outside of the message's [range_min, range_max]
     and NaN become `inf`, as REP 117 (https://www.ros.org/reps/rep-0117.html) has it that they are
-    no measurements. The time is that of the message's header.
+    no measurements, and so do readings that pile up (`dollop.formats.scans.no_return_from`).
+    The time is that of the message's header.
 
     Parameters
     ----------
@@ -70,11 +71,13 @@ def read_log(path, topic=None):
         warn_of(path, f"{unread}; {remedy}")
     if not scans:
         raise FormatError("the topic holds no scan", path)
-    scans, t = usable_scans(path, dict(enumerate(scans, 1)), {})
+    scans, t, notes = usable_scans(path, dict(enumerate(scans, 1)), {})
     beams, ranges = scans[0].beams, np.array([scan.ranges for scan in scans])
     order = slice(None, None, 1 if beams.step > 0 else -1)
     ranges, angles, poses = ranges[:, order], beams.angles[order], [scan.pose for scan in scans]
-    return from_file(path, LaserLog, t, ranges, angles, poses, beams.max_range)
+    limit, further = no_return_from(path, ranges, angles, np.inf)
+    ranges, limit = np.where(ranges < limit, ranges, np.inf), min(limit, beams.max_range)
+    return from_file(path, LaserLog, t, ranges, angles, poses, limit, notes + further)
 
 
 def _scans(path, bag, topic):

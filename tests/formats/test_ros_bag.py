@@ -25,7 +25,7 @@ def scans_of(store, ranges=RANGES, step=0.5, count=3):
     """Messages a tenth of a second apart, of beams from -1 rad on."""
     types, ros1 = store.types, "seq" in store.types["std_msgs/msg/Header"].__dataclass_fields__
     for i in range(count):
-        stamp = types["builtin_interfaces/msg/Time"](sec=100, nanosec=i * 100_000_000)
+        stamp = types["builtin_interfaces/msg/Time"](sec=100 + i // 10, nanosec=i % 10 * 100_000_000)
         number = {"seq": i} if ros1 else {}
         header = types["std_msgs/msg/Header"](**number, stamp=stamp, frame_id="laser")
         values, none = np.array(ranges, np.float32), np.array([], np.float32)
@@ -79,6 +79,22 @@ def test_laser_turning_clockwise(tmp_path):
 
     log = read_log(write_bag(tmp_path / "a.bag", "1", {"/scan": clockwise}))
     assert log.angles.tolist() == [-2.0, -1.5, -1.0] and log.ranges[0].tolist() == [3, 2, 1]
+
+
+def test_a_driver_that_reports_its_maximum_range(tmp_path):
+    """Where nothing came back some drivers say the largest range that they allow: it is no distance."""
+    rng = np.random.default_rng(0)
+    rows = rng.uniform(1.0, 4.0, (60, 8))
+    rows[np.arange(60), np.arange(60) % 8] = 8.0
+
+    def messages(store):
+        for i, message in enumerate(scans_of(store, [1.0] * 8, count=60)):
+            message.ranges[:] = rows[i]
+            yield message
+
+    log = read_log(write_bag(tmp_path / "a.bag", "1", {"/scan": messages}))
+    assert np.array_equal(np.isinf(log.ranges), rows == 8.0) and log.max_range == 8.0
+    assert "12.5% of the readings pile up at 8 m" in log.notes[0].text
 
 
 def test_topics_are_listed(tmp_path):
