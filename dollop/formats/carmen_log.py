@@ -8,18 +8,18 @@ log began.
 import gzip
 import io
 from contextlib import nullcontext
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from dollop.checks import check_positive, checked_array, checked_number
-from dollop.formats.files import FormatError, from_file, read_bytes, warn_of, whole_file
-from dollop.formats.scans import Beams, Scan, doubtful, forgive, longest_rise, no_return_from, usable_scans
+from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
+from dollop.formats.odometry import Odometry
+from dollop.formats.scans import Beams, Scan, doubtful, forgive, forgive_disorder, no_return_from, usable_scans
 from dollop.laser import LaserLog
 from dollop.pose import wrapped
 
-__all__ = ["Odometry", "read_log", "read_odometry", "write_log"]
+__all__ = ["read_log", "read_odometry", "write_log"]
 
 FULL_SCALES = ((8.183, 8.191), (16.375, 16.383), (32.759, 32.767), (51.14, 51.16), (80.0, np.inf))
 """Readings in m that are a code and no distance: the last nine values of 13, 14 and 15 bits of 1 mm
@@ -31,31 +31,6 @@ PER_DEGREE = {180: 1, 181: 1, 360: 2, 361: 2, 400: 4, 401: 4}
 
 SICK_TYPES, UNKNOWN_TYPE = (0, 1), 99
 """`laser_type` of the SICK LMS and PLS, and of a laser CARMEN has no name for."""
-
-
-@dataclass(frozen=True, eq=False)
-class Odometry:
-    """What the wheels report.
-
-    Attributes
-    ----------
-    t : (N,) float array
-        Time in s, increasing.
-    poses : (N, 3) float array
-        Robot in the odometry's own frame: x, y in m, theta in rad, wrapped to (-pi, pi].
-    velocities : (N, 2) float array
-        Forward in m/s, turning in rad/s.
-    """
-
-    t: np.ndarray
-    poses: np.ndarray
-    velocities: np.ndarray
-
-    def __len__(self):
-        return len(self.t)
-
-    def __repr__(self):
-        return f"Odometry of {len(self)} messages in {np.ptp(self.t):.1f} s"
 
 
 def read_log(path, max_range=None, fov=None):
@@ -340,11 +315,6 @@ def read_odometry(path):
         raise FormatError("no readable ODOM message in the file", path)
     forgive(path, bad, len(good) + len(bad))
     rows = np.array(list(good.values()))
-    keep = longest_rise(rows[:, 6])
-    lost = f"{len(rows) - len(keep)} of {len(rows)} ODOM messages"
-    if 2 * len(keep) < len(rows):
-        raise FormatError(f"the clock is useless: {lost} are out of order", path)
-    if len(keep) < len(rows):
-        warn_of(path, f"left out {lost}, which the clock puts out of order")
+    rows = rows[forgive_disorder(path, rows[:, 6], "ODOM")]
     rows[:, 2] = wrapped(rows[:, 2])
-    return Odometry(rows[keep, 6], rows[keep, :3], rows[keep, 3:5])
+    return Odometry(rows[:, 6], rows[:, :3], rows[:, 3:5])

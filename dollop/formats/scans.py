@@ -9,7 +9,7 @@ import numpy as np
 from dollop.checks import Note
 from dollop.formats.files import FormatError, warn_of
 
-__all__ = ["Beams", "Scan", "doubtful", "forgive", "longest_rise", "no_return_from", "usable_scans"]
+__all__ = ["Beams", "Scan", "doubtful", "forgive", "forgive_disorder", "longest_rise", "no_return_from", "usable_scans"]
 
 NOMINAL_RATE = 10.0
 """Scans per second of a SICK LMS 200 at 1 degree and 38400 baud: what a log without a usable clock
@@ -258,6 +258,42 @@ def forgive(path, bad, total):
         raise FormatError(f"{bad[line]} ({len(bad)} of {total} scans are broken)", path, line)
     lost = f"left out {len(bad)} broken of {total} scans, the first on line {line}"
     warn_of(path, f"{lost}: {bad[line]}")
+
+
+def forgive_disorder(path, t, name):
+    """Which messages are in order; the others are accepted with a warning, or the file is refused.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, for the message.
+    t : (N,) float array
+        Times of the messages in s.
+    name : str
+        What they are called.
+
+    Returns
+    -------
+    (K,) int array
+        Indices of the messages that stay.
+
+    Raises
+    ------
+    FormatError
+        If the clock is in order for less than half of them.
+
+    Warns
+    -----
+    UserWarning
+        With their number, if some are left out.
+    """
+    keep = longest_rise(t)
+    lost = f"{len(t) - len(keep)} of {len(t)} {name} messages"
+    if 2 * len(keep) < len(t):
+        raise FormatError(f"the clock is useless: {lost} are out of order", path)
+    if len(keep) < len(t):
+        warn_of(path, f"left out {lost}, which the clock puts out of order")
+    return keep
 
 
 def longest_rise(values):

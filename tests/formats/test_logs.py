@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dollop.formats.files import FormatError
-from dollop.formats.logs import read_log, write_log
+from dollop.formats.logs import read_log, read_odometry, write_log
 from dollop.laser import LaserLog
 
 LOG = LaserLog([0.0, 0.1], [[1.0, np.inf], [2.0, 3.0]], [-0.5, 0.5], [[0, 0, 0], [1, 0, 0]], 8.191)
@@ -40,8 +40,21 @@ def test_other_suffixes_are_refused(tmp_path):
 def test_missing_file(tmp_path):
     """A file that is not there is named."""
     for name in ("a.log", "a.bag", "a"):
-        with pytest.raises(FileNotFoundError, match=name):
-            read_log(tmp_path / name)
+        for read in (read_log, read_odometry):
+            with pytest.raises(FileNotFoundError, match=name):
+                read(tmp_path / name)
+
+
+def test_odometry_by_suffix(tmp_path):
+    """Of a CARMEN log it is the ODOM messages, and there is no topic to name."""
+    lines = [f"ODOM {i} 0 0 0.5 0 0 {i} host 0" for i in range(30)]
+    (tmp_path / "a.log").write_text("\n".join(lines))
+    assert len(read_odometry(tmp_path / "a.log")) == 30
+    with pytest.raises(ValueError, match="no topics, got topic='/odom'"):
+        read_odometry(tmp_path / "a.log", topic="/odom")
+    (tmp_path / "a.txt").write_text("x")
+    with pytest.raises(FormatError, match="a CARMEN log is named"):
+        read_odometry(tmp_path / "a.txt")
 
 
 def test_carmen_logs_have_no_topics(tmp_path):
@@ -78,8 +91,8 @@ def test_bags_without_rosbags_say_what_to_install(tmp_path, monkeypatch):
         ("carmen_logs/edmonton-corrected.log.gz", (340, 180), 51.09, None, ["sensor"]),
         ("carmen_logs/csail-corrected.log.gz", (406, 361), 80.0, "404 of 406 scans are out", ["clock"]),
         ("carmen_logs/orebro-corrected.log.gz", (237, 181), 32.759, "236 of 237 scans are out", ["clock"]),
-        ("people/demo_stationary_simple_environment.bag", (1265, 512), 5.6, None, []),
-        ("people/walker_1.bag", (400, 768), 11.0, None, []),
+        ("people/demo_stationary_simple_environment.bag", (1265, 512), 5.6, None, ["poses"]),
+        ("people/walker_1.bag", (400, 768), 11.0, None, ["poses"]),
     ],
 )
 def test_real_logs(name, shape, max_range, warning, kinds, recwarn):
