@@ -29,4 +29,5 @@ class Odometry:
         return len(self.t)
 
     def __repr__(self):
-        return f"Odometry of {len(self)} messages in {np.ptp(self.t):.1f} s"
+        span = np.ptp(self.t) if len(self) else 0.0
+        return f"Odometry of {len(self)} messages in {span:.1f} s"

@@ -58,6 +58,8 @@ CLOSE_SIGMA = 0.05
 RIVAL, TOLD = 0.05, 0.10
 """How much worse, in that field's mean q, the second best place must explain the scans, or the best is in
 doubt; and how much worse a place may that is told, or followed so far."""
+HOPELESS = 0.20
+"""How much worse than one that fits, or than the best, a place may be to be tried further, in mean q."""
 TRIES = 12
 """At how many places of a log the search begins anew, at most."""
 LEAST_ERROR = 0.0005
@@ -106,7 +108,7 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     --------
     >>> from dollop.gridmap import OccupancyGrid
     >>> from dollop.laser import LaserLog
-    >>> angles = np.linspace(-3, 3, 61)
+    >>> angles = np.linspace(-3, 3, 60)
     >>> walls = np.minimum(2 / np.abs(np.cos(angles)), np.where(angles > 0, 1.5, 1) / np.abs(np.sin(angles)))
     >>> log = LaserLog([0.0, 0.1], [walls, walls], angles, np.zeros((2, 3)), max_range=8.0)
     >>> drifting = replace(log, poses=log.poses + [0.1, -0.05, 0.05])
@@ -123,7 +125,7 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     poses, located = course.bridged()
     poses = scans.smoothed(poses, by_odometry, located)
     notes = [note for note in log.notes if note.kind != "poses"]
-    return replace(log, poses=poses, notes=(*notes, *_doubts(located, search.margin)))
+    return replace(log, poses=poses, notes=(*notes, *_doubts(located, course.margin)))
 
 
 def _laser_odometry(log, odometry, laser):
@@ -156,12 +158,13 @@ def _doubts(located, margin):
 class _Course:
     """Where the particles have the laser, as far as they have followed it.
 
-    `poses` (T, 3) and `located` (T,), in order of the scans.
+    `poses` (T, 3) and `located` (T,), in order of the scans; `margin` is how much better than any other the
+    places were that it began at, the least.
     """
 
     def __init__(self, log, by_odometry, follower):
         self._ranges, self._by_odometry, self._follower = _thinned(log)[0], by_odometry, follower
-        self.poses, self.located = by_odometry.copy(), np.zeros(len(log), bool)
+        self.poses, self.located, self.margin = by_odometry.copy(), np.zeros(len(log), bool), np.inf
 
     def follow(self, scans, start):
         """Follow scans from a pose, until one is located already or the robot is lost; that scan or None."""
@@ -176,6 +179,16 @@ class _Course:
                 return i
             self.poses[i], self.located[i], before = follower.pose, True, i
         return None
+
+    def follow_both_ways(self, scan, start, margin):
+        """Follow the scans from one on, and those before it; where the robot is lost ahead, or None."""
+        before = self.located.sum()
+        end = self.follow(range(scan, len(self.located)), start)
+        if scan:
+            self.follow(range(scan, -1, -1), start)
+        if self.located.sum() > before:
+            self.margin = min(self.margin, margin)
+        return end
 
     def guess(self, scan):
         """Where the odometry has the laser at a scan, from the last one before it that is located; or None."""
@@ -213,15 +226,12 @@ def _followed(log, search, by_odometry, follower):
     """The course of the particles, which begin anew where they are lost."""
     course = _Course(log, by_odometry, follower)
     begin, guess, stride = 0, by_odometry[0], max(1, len(log) // TRIES)
-    while begin is not None and begin < len(log):
-        start, end = search.place(begin, guess), begin
+    while begin < len(log):
+        (start, margin), end = search.place(begin, guess), begin
         if start is not None:
-            course.located[begin] = False
-            end = course.follow(range(begin, len(log)), start)
-            if begin:
-                course.follow(range(begin, -1, -1), start)
-        begin = None if end is None else max(end, begin + stride)
-        guess = None if begin is None else course.guess(begin)
+            end = course.follow_both_ways(begin, start, margin)
+        begin = len(log) if end is None else max(end, begin + stride)
+        guess = course.guess(begin) if begin < len(log) else None
     return course
 
 
@@ -229,26 +239,29 @@ def _followed(log, search, by_odometry, follower):
 
 
 class _Search:
-    """Places on the map that explain a scan and those after it.
-
-    `margin` is how much better in mean q the place was than any other, the least of all searches.
-    """
+    """Places on the map that explain a scan and those after it."""
 
     def __init__(self, scans, by_odometry, follower):
-        self._scans, self._by_odometry, self._follower, self.margin = scans, by_odometry, follower, np.inf
+        self._scans, self._by_odometry, self._follower = scans, by_odometry, follower
 
     def place(self, scan, guess=None):
-        """Pose (3,) at a scan: near the guess if it explains the scans, else the best; None if none does."""
-        told = np.reshape([] if guess is None else guess, (-1, 3))
-        poses, fits, close = self._tried(np.vstack([told, self._drawn(scan)]), self._keys(scan))
+        """Pose (3,) at a scan: near the guess if it explains the scans, else the best; None if none does.
+
+        And how much better it is than any other, in mean q; `inf` if it was guessed.
+        """
+        keys = self._keys(scan)
+        told = self._tried(np.reshape([] if guess is None else guess, (-1, 3)), keys)
+        if guess is not None and told[1][0] >= USUAL_FIT:
+            return told[0][0], np.inf
+        poses, fits, close = map(np.concatenate, zip(told, self._tried(self._drawn(scan), keys), strict=True))
         best = close.argmax()
-        if len(told) and fits[0] >= FITS and close[0] >= close[best] - TOLD:
-            return poses[0]
+        if guess is not None and fits[0] >= FITS and close[0] >= close[best] - TOLD:
+            return poses[0], np.inf
         if fits[best] < FITS:
-            return None
-        others = _differ(poses, poses[best])
-        self.margin = min(self.margin, close[best] - close[others].max(initial=0.0))
-        return poses[best]
+            return None, np.inf
+        if guess is not None and not _differ(poses[[best]], guess)[0]:
+            return poses[best], np.inf
+        return poses[best], close[best] - close[_differ(poses, poses[best])].max(initial=0.0)
 
     def _keys(self, scan):
         """Indices of scans from one on, with some way or turn between them."""
@@ -260,7 +273,8 @@ class _Search:
     def _drawn(self, scan):
         """Poses (N, 3) of the lattice that explain a scan best, one of each surroundings."""
         scores = self._follower.lattice_scores(self._scans.ends[scan][self._scans.back[scan]][::2])
-        best = np.argsort(-scores, kind="stable")[:BEST]
+        best = np.argpartition(-scores, min(BEST, len(scores)) - 1)[:BEST]
+        best = best[np.lexsort([best, -scores[best]])]
         poses = self._follower.lattice_poses(best)
         chosen = []
         while len(poses) and len(chosen) < CANDIDATES:
@@ -270,14 +284,17 @@ class _Search:
 
     def _tried(self, poses, keys):
         """Poses (N, 3) at the first of some scans that were tried, refined, and how well and closely they fit all."""
-        poses = first = self._scans.refined(poses, keys[0])
-        fits = [self._fits(poses, keys[0])]
-        for before, key in zip(keys[:-1], keys[1:], strict=True):
-            told = composed(poses, between(self._by_odometry[before], self._by_odometry[key]))
-            poses = self._scans.refined(told, key)
-            kept = (np.abs(between(told, poses)) < CUT).all(axis=1)
-            fits.append(np.where(kept, self._fits(poses, key), 0.0))
-        return first, *np.mean(fits, axis=0)
+        poses = self._scans.refined(poses, keys[0])
+        first, fits, alive = poses, self._fits(poses, keys[0]), np.arange(len(poses))
+        for tried, (before, key) in enumerate(zip(keys[:-1], keys[1:], strict=True), 1):
+            hopeless = tried * np.array([FITS - HOPELESS, fits[1].max(initial=0.0) / tried - HOPELESS])
+            alive = alive[(fits[:, alive] > hopeless[:, None]).all(axis=0)]
+            told = composed(poses[alive], between(self._by_odometry[before], self._by_odometry[key]))
+            poses = poses.copy()
+            poses[alive] = self._scans.refined(told, key)
+            kept = (np.abs(between(told, poses[alive])) < CUT).all(axis=1)
+            fits[:, alive] += np.where(kept, self._fits(poses[alive], key), 0.0)
+        return first, *fits / len(keys)
 
     def _fits(self, poses, scan):
         """Mean q of a scan's beams at poses (N, 3), as it is and for a narrow field, (2, N)."""
