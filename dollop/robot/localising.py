@@ -164,6 +164,7 @@ class _Course:
 
     def __init__(self, log, by_odometry, follower):
         self._ranges, self._by_odometry, self._follower = _thinned(log)[0], by_odometry, follower
+        self._last = None  # the last scan that a place was found for
         self.poses, self.located, self.margin = by_odometry.copy(), np.zeros(len(log), bool), np.inf
 
     def follow(self, scans, start):
@@ -182,7 +183,7 @@ class _Course:
 
     def follow_both_ways(self, scan, start, margin):
         """Follow the scans from one on, and those before it; where the robot is lost ahead, or None."""
-        before = self.located.sum()
+        before, self.poses[scan], self._last = self.located.sum(), start, scan
         end = self.follow(range(scan, len(self.located)), start)
         if scan:
             self.follow(range(scan, -1, -1), start)
@@ -190,10 +191,17 @@ class _Course:
             self.margin = min(self.margin, margin)
         return end
 
+    @property
+    def begun(self):
+        """Bool: whether the robot was anywhere yet."""
+        return self._last is not None
+
     def guess(self, scan):
         """Where the odometry has the laser at a scan, from the last one before it that is located; or None."""
-        known = np.flatnonzero(self.located[:scan])
-        return self._by_odometry_from(known[-1], scan) if known.size else None
+        if self._last is None:
+            return None
+        known = np.append(self._last, np.flatnonzero(self.located[:scan])).max()
+        return self._by_odometry_from(known, scan)
 
     def bridged(self):
         """Poses (T, 3) and which are located (T,), by odometry from the last scan that is, or the first.
@@ -227,7 +235,7 @@ def _followed(log, search, by_odometry, follower):
     course = _Course(log, by_odometry, follower)
     begin, guess, stride = 0, by_odometry[0], max(1, len(log) // TRIES)
     while begin < len(log):
-        (start, margin), end = search.place(begin, guess), begin
+        (start, margin), end = search.place(begin, guess, course.begun), begin
         if start is not None:
             end = course.follow_both_ways(begin, start, margin)
         begin = len(log) if end is None else max(end, begin + stride)
@@ -244,10 +252,11 @@ class _Search:
     def __init__(self, scans, by_odometry, follower):
         self._scans, self._by_odometry, self._follower = scans, by_odometry, follower
 
-    def place(self, scan, guess=None):
+    def place(self, scan, guess=None, followed=False):
         """Pose (3,) at a scan: near the guess if it explains the scans, else the best; None if none does.
 
-        And how much better it is than any other, in mean q; `inf` if it was guessed.
+        And how much better it is than any other, in mean q; `inf` if it was guessed. A robot that was followed
+        so far is believed to be carried elsewhere only if the scans fit there as usual, and nowhere else.
         """
         keys = self._keys(scan)
         told = self._tried(np.reshape([] if guess is None else guess, (-1, 3)), keys)
@@ -257,11 +266,10 @@ class _Search:
         best = close.argmax()
         if guess is not None and fits[0] >= FITS and close[0] >= close[best] - TOLD:
             return poses[0], np.inf
-        if fits[best] < FITS:
+        margin = close[best] - close[_differ(poses, poses[best])].max(initial=0.0)
+        if fits[best] < FITS or (followed and not (fits[best] >= USUAL_FIT and margin >= RIVAL)):
             return None, np.inf
-        if guess is not None and not _differ(poses[[best]], guess)[0]:
-            return poses[best], np.inf
-        return poses[best], close[best] - close[_differ(poses, poses[best])].max(initial=0.0)
+        return poses[best], margin
 
     def _keys(self, scan):
         """Indices of scans from one on, with some way or turn between them."""
