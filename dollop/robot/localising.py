@@ -66,6 +66,8 @@ LEAST_ERROR = 0.0005
 """m and rad: of a step by odometry, however short."""
 CUT = 0.3
 """m and rad: a step that differs so much from the odometry's was none: somebody carried the robot."""
+LOOSE = 0.15
+"""m: standard deviation along the weakest direction, of half of all scans, from which on there is a note."""
 BRIDGED = 0.15
 """m and rad: by how much the odometry may miss the next scan that is located, for those before it to be."""
 BORDER = 1.0
@@ -96,7 +98,8 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     -------
     LaserLog
         The same scans, with poses in the frame of the map. Its notes of kind "poses" are new: with
-        doubt, if some scans could not be localised, or if another place explains them as well.
+        doubt, if some scans could not be localised, if another place explains them as well, or if the
+        scans do not hold the laser along some direction, as in a corridor.
 
     Raises
     ------
@@ -125,7 +128,8 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     poses, located = course.bridged()
     poses = scans.smoothed(poses, by_odometry, located)
     notes = [note for note in log.notes if note.kind != "poses"]
-    return replace(log, poses=poses, notes=(*notes, *_doubts(located, course.margin)))
+    loose = np.median(scans.looseness(poses)[course.located])
+    return replace(log, poses=poses, notes=(*notes, *_doubts(located, course.margin, loose)))
 
 
 def _laser_odometry(log, odometry, laser):
@@ -142,14 +146,17 @@ def _laser_odometry(log, odometry, laser):
     return composed(poses_at(log.t, t, poses), mount)
 
 
-def _doubts(located, margin):
-    """Notes on scans that are not located (T,), and on a place that is hardly better than another."""
+def _doubts(located, margin, loose):
+    """Notes on scans that are not located (T,), on a place hardly better than another, and on a loose hold in m."""
     if not located.all():
         text = f"{1 - located.mean():.1%} of the scans could not be localised: the map does not explain them"
         yield Note("poses", text)
     if margin < RIVAL:
         text = f"the map looks alike from another place: it explains the scans worse by {max(margin, 0):.2f} only"
         yield Note("poses", f"{text}, of a fit between 0 and 1")
+    if loose > LOOSE:
+        text = f"a scan holds the laser to {loose:.2g} m only along one direction, as in a corridor"
+        yield Note("poses", f"{text}: along it the poses are the odometry's")
 
 
 # ---- following
@@ -356,6 +363,13 @@ class _Scans:
             gradient, matrix = self._pulls(poses, self.ends, back, SIGMA)
             poses = _moved(poses, _banded_step(poses, gradient, matrix, steps, 1 / spans**2))
         return poses
+
+    def looseness(self, poses):
+        """Standard deviation (T,) in m to which each scan alone holds its pose (T, 3) along the weakest direction."""
+        _, matrix = self._pulls(poses, self.ends, self.back, SIGMA)
+        turn = matrix[:, :2, 2:]
+        places = matrix[:, :2, :2] - turn @ np.swapaxes(turn, 1, 2) / (matrix[:, 2:, 2:] + 1e-9)
+        return 1 / np.sqrt(np.linalg.eigvalsh(places)[:, 0].clip(1e-9))
 
     def _pulls(self, poses, ends, back, sigma):
         """Gradient (N, 3) and matrix (N, 3, 3) of the springs at beam ends (N, M, 2) in the poses' frames."""

@@ -160,6 +160,19 @@ def test_a_room_that_looks_alike_from_two_sides():
     assert "looks alike from another place" in found.notes[0].text
 
 
+def test_a_corridor_whose_ends_are_out_of_sight():
+    """Across it the poses are right; along it nothing tells, and a note says so."""
+    walls = np.array([[0, -0.1, 60, 0], [0, 2.0, 60, 2.1]])
+    truth = followed([30.0, 1.2, 0.0], np.tile([0.05, 0.0, 0.0], (60, 1)))
+    drifting = followed(truth[0], np.tile([0.055, 0.0, 0.001], (60, 1)))
+    log = recorded(truth, drifting, walls)
+    log = replace(log, ranges=np.where(log.ranges < 12, log.ranges, np.inf))
+    found = localise(log, None, drawn_map(walls, 60.0, 2.0))
+    assert np.abs(found.poses - truth)[:, 1].max() < 0.03
+    assert [(note.kind, note.doubt) for note in found.notes] == [("poses", True)]
+    assert "along one direction, as in a corridor" in found.notes[0].text
+
+
 def test_a_strange_room_is_refused(background):
     """Where the map explains nothing, no pose is told."""
     circle = np.column_stack([3 * np.cos(np.arange(40) / 6), 3 * np.sin(np.arange(40) / 6), np.arange(40) / 6])
