@@ -455,7 +455,7 @@ class _Springs:
     def __init__(self, background):
         self._border = int(np.ceil(BORDER / background.resolution))
         blocked = np.pad(background.occupied, self._border)
-        half = surface_distances(blocked, background.resolution) ** 2 / 2
+        half = (surface_distances(blocked, background.resolution) ** 2 / 2).astype(np.float32)
         down, right = np.gradient(half, background.resolution)
         q_down, q_right = np.gradient(np.exp(-half / SIGMA**2))
         products = q_right * q_right, q_right * q_down, q_down * q_down

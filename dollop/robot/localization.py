@@ -17,6 +17,7 @@ half of it, so a pose that was searched for is believed only when it has explain
 half a turn.
 """
 
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -105,16 +106,19 @@ class MonteCarloLocalizer:
         free = (background.occupancy < FREE_BELOW) & ~blocked
         if not free.any():
             raise ValueError("the background must have a free cell to search, got none")
-        away = surface_distances(blocked, background.resolution)
-        self._field = LikelihoodField(away, SIGMA, *frame)
-        self._wide_field = LikelihoodField(away, WIDE_SIGMA, *frame)
-        self._lattice = lattice(free, background)
+        self._away, self._frame = surface_distances(blocked, background.resolution), frame
+        self._field, self._lattice = LikelihoodField(self._away, SIGMA, *frame), lattice(free, background)
         self._usual_fit = USUAL_FIT
         self.pose, self.spread, self.fit = np.full(3, np.nan), np.full(2, np.inf), 0.0
         if pose is None:
             self.search()
         else:
             self.start(pose)
+
+    @cached_property
+    def _wide_field(self):
+        """For the lattice, which a robot that knows where it is does not need."""
+        return LikelihoodField(self._away, WIDE_SIGMA, *self._frame)
 
     @property
     def localised(self):

@@ -1,6 +1,9 @@
 """Localising a whole log: known poses are recovered, and what is not sure is said."""
 
+import os
+import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +11,7 @@ from rooms import ANGLES, CANS, FURNITURE, WALLS, drawn_map, room_map, scan
 
 from dollop import localise
 from dollop.checks import Note
-from dollop.formats import Odometry
+from dollop.formats import Odometry, read_log, read_odometry
 from dollop.gridmap import OccupancyGrid
 from dollop.laser import LaserLog
 from dollop.pose import between, composed
@@ -245,6 +248,19 @@ def test_a_map_without_a_free_cell():
     """There is nowhere to search."""
     with pytest.raises(ValueError, match="must have a free cell"):
         localise(recorded(TRUTH, DRIFTING), None, OccupancyGrid(np.ones((9, 9)), (0.0, 0.0), 0.05))
+
+
+@pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="no recordings")
+def test_a_real_drive_of_half_a_kilometre():
+    """Odometry that strays by more than 2 m is put on a map that others made: 5 cm from where they have it."""
+    path = Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / "carmen_logs/intel-corrected.log.gz"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        log, odometry = read_log(path), read_odometry(path)
+    found = localise(log, odometry, OccupancyGrid.from_log(log))
+    place, turn = errors(found, log.poses)
+    assert place.mean() < 0.06 and np.median(turn) < 1
+    assert not found.notes
 
 
 # ---- the parts
