@@ -22,6 +22,7 @@ import numpy as np
 import scipy
 
 from dollop.checks import Note, checked_array
+from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.gridmap import in_cells
 from dollop.pose import between, composed, motion_between, poses_at, rotation, wrapped
 from dollop.robot.localization import (
@@ -34,7 +35,7 @@ from dollop.robot.localization import (
     USUAL_FIT,
     WIDE_SIGMA,
     MonteCarloLocalizer,
-    surface_distances,
+    surface_cells,
 )
 
 __all__ = ["localise"]
@@ -66,10 +67,12 @@ LEAST_ERROR = 0.0005
 """m and rad: of a step by odometry, however short."""
 CUT = 0.3
 """m and rad: a step that differs so much from the odometry's was none: somebody carried the robot."""
-LOOSE = 0.15
+LOOSE = 0.20
 """m: standard deviation along the weakest direction, of half of all scans, from which on there is a note."""
 BRIDGED = 0.15
 """m and rad: by how much the odometry may miss the next scan that is located, for those before it to be."""
+KERNEL = np.array([[-1.0], [0.0], [1.0]]) * np.ones((1, 3))
+"""Of a cell and those round it: which lie ahead and which behind."""
 BORDER = 1.0
 """m round the map where beams may end."""
 
@@ -271,7 +274,7 @@ class _Search:
             return told[0][0], np.inf
         poses, fits, close = map(np.concatenate, zip(told, self._tried(self._drawn(scan), keys), strict=True))
         best = close.argmax()
-        if guess is not None and fits[0] >= FITS and close[0] >= close[best] - TOLD:
+        if guess is not None and fits[0] >= FITS - HOPELESS and close[0] >= close[best] - TOLD:
             return poses[0], np.inf
         margin = close[best] - close[_differ(poses, poses[best])].max(initial=0.0)
         if fits[best] < FITS or (followed and not (fits[best] >= USUAL_FIT and margin >= RIVAL)):
@@ -359,8 +362,8 @@ class _Scans:
         spans = _step_errors(steps)
         spans[(np.abs(between(poses[:-1], poses[1:]) - steps) > CUT).any(axis=1)] = np.inf
         back = self.back & located[:, None]
-        for _ in range(ROUNDS):
-            gradient, matrix = self._pulls(poses, self.ends, back, SIGMA)
+        for sigma in np.repeat([SIGMA, CLOSE_SIGMA], ROUNDS):
+            gradient, matrix = self._pulls(poses, self.ends, back, sigma)
             poses = _moved(poses, _banded_step(poses, gradient, matrix, steps, 1 / spans**2))
         return poses
 
@@ -445,6 +448,26 @@ def _step_derivatives(poses):
     return before, after
 
 
+def _half_squared_distances(occupancy, resolution):
+    """Of each cell (H, W) to the nearest surface, in m^2; within its cell a surface lies where those beside it say.
+
+    Where a wall runs along the border of two cells, both are hit, one of them more.
+    """
+    blocked = occupancy >= OCCUPIED_FROM
+    surface = surface_cells(blocked)
+    if not surface.any():
+        return np.full(occupancy.shape, (resolution * np.hypot(*occupancy.shape)) ** 2 / 2)
+    nearest = scipy.ndimage.distance_transform_edt(~surface, return_distances=False, return_indices=True)
+    hit = np.where(blocked & ~surface, 0.0, occupancy)
+    weight = scipy.ndimage.uniform_filter(hit, 3, mode="constant")
+    places = np.indices(occupancy.shape).astype(float)
+    shifts = []
+    for axis, kernel in enumerate((KERNEL, KERNEL.T)):
+        lean = scipy.ndimage.correlate(hit, kernel, mode="constant") / np.maximum(9 * weight, 0.5)
+        shifts.append((places[axis] + lean)[tuple(nearest)] - places[axis])
+    return (shifts[0] ** 2 + shifts[1] ** 2) * resolution**2 / 2
+
+
 class _Springs:
     """Of each place on the map: half the squared distance to the nearest surface, its slope, and the normal.
 
@@ -454,15 +477,15 @@ class _Springs:
 
     def __init__(self, background):
         self._border = int(np.ceil(BORDER / background.resolution))
-        blocked = np.pad(background.occupied, self._border)
-        half = (surface_distances(blocked, background.resolution) ** 2 / 2).astype(np.float32)
+        occupancy = np.pad(np.nan_to_num(background.occupancy), self._border)
+        half = _half_squared_distances(occupancy, background.resolution).astype(np.float32)
         down, right = np.gradient(half, background.resolution)
         q_down, q_right = np.gradient(np.exp(-half / SIGMA**2))
         products = q_right * q_right, q_right * q_down, q_down * q_down
         xx, xy, yy = (scipy.ndimage.gaussian_filter(product, 1.0) for product in products)
         size = np.maximum(xx + yy, 1e-12)
         self._table = np.stack([half, right, down, xx / size, xy / size, yy / size], axis=-1).reshape(-1, 6)
-        self._rows, self._columns = blocked.shape
+        self._rows, self._columns = occupancy.shape
         self._frame = background.origin, background.resolution
 
     def at(self, points):

@@ -30,7 +30,7 @@ from dollop.robot.avoidance import FREE_BELOW
 
 __all__ = [
     "BEAM_STEP", "DOUBTS", "FLOOR", "INDEPENDENT", "LOST", "SIGMA", "USUAL_FIT", "WIDE_SIGMA", "MonteCarloLocalizer",
-    "surface_distances",
+    "surface_cells",
 ]  # fmt: skip
 
 SIGMA, WIDE_SIGMA = 0.10, 0.20
@@ -106,7 +106,8 @@ class MonteCarloLocalizer:
         free = (background.occupancy < FREE_BELOW) & ~blocked
         if not free.any():
             raise ValueError("the background must have a free cell to search, got none")
-        self._away, self._frame = surface_distances(blocked, background.resolution), frame
+        surface, self._frame = surface_cells(blocked), frame
+        self._away = scipy.ndimage.distance_transform_edt(~surface, sampling=background.resolution)
         self._field, self._lattice = LikelihoodField(self._away, SIGMA, *frame), lattice(free, background)
         self._usual_fit = USUAL_FIT
         self.pose, self.spread, self.fit = np.full(3, np.nan), np.full(2, np.inf), 0.0
@@ -293,24 +294,19 @@ class LikelihoodField:
         return ends * np.minimum(1.0, self.reach / np.maximum(np.hypot(*ends.T), 1e-9))[:, None]
 
 
-def surface_distances(blocked, resolution):
-    """Distance from every cell to the nearest blocked one at which beams may end.
+def surface_cells(blocked):
+    """Blocked cells at which beams may end.
 
     Parameters
     ----------
     blocked : (H, W) bool array
-    resolution : float
-        Side of a cell in m.
 
     Returns
     -------
-    (H, W) float array
-        Metres, centre to centre; the size of the grid if none is blocked.
+    (H, W) bool array
+        Without those inside of something.
     """
-    surface = blocked & ~scipy.ndimage.binary_erosion(blocked, border_value=1)
-    if not surface.any():
-        return np.full(blocked.shape, resolution * np.hypot(*blocked.shape))
-    return scipy.ndimage.distance_transform_edt(~surface, sampling=resolution)
+    return blocked & ~scipy.ndimage.binary_erosion(blocked, border_value=1)
 
 
 def lattice(free, background):

@@ -279,6 +279,25 @@ def test_springs_pull_to_the_surface():
     assert np.exp(-far / SIGMA**2) < 1e-9
 
 
+@pytest.mark.parametrize("beside", [0.0, 0.3, 1.0])
+def test_a_surface_lies_between_the_cells_that_are_hit(beside):
+    """A wall along a border of cells is hit in both: what pulls least is where the hits have their middle."""
+    occupancy = np.zeros((40, 40))
+    occupancy[:, 20], occupancy[:, 21] = 1.0, beside
+    x = np.linspace(0.9, 1.15, 251)
+    half = _Springs(OccupancyGrid(occupancy, (0.0, 0.0), 0.05)).at(np.column_stack([x, np.ones(251)]))[0]
+    middle = 0.05 * (20.5 + beside / (1 + beside))
+    assert x[half <= half.min() + 2e-5].mean() == pytest.approx(middle, abs=0.0125)  # a quarter of a cell
+
+
+def test_what_is_solid_ends_where_its_outer_cells_are():
+    """The inside of a filled box draws nothing inwards."""
+    occupancy = np.zeros((40, 40))
+    occupancy[:, 20:30] = 1.0
+    half = _Springs(OccupancyGrid(occupancy, (0.0, 0.0), 0.05)).at(np.array([[20.5 * 0.05, 1.0], [0.8, 1.0]]))[0]
+    np.testing.assert_allclose(np.sqrt(2 * half), [0.0, 0.225], atol=0.005)
+
+
 def test_derivatives_of_steps_against_differences():
     """How the steps change with the poses, by moving each of them a little."""
     poses, small = np.random.default_rng(0).normal(size=(5, 3)), 1e-6
