@@ -80,6 +80,7 @@ def _parser():
     log = argparse.ArgumentParser(add_help=False)
     log.add_argument("log", help="CARMEN log (.log, .log.gz, .clf) or ROS bag")
     log.add_argument("--topic", help="LaserScan topic of a bag, if there are several")
+    log.add_argument("--fov", type=_degrees, metavar="DEGREES", help="field of view, if the log does not state it")
 
     def command(run, name, help, *parents):
         parser = commands.add_parser(name, parents=parents, help=help)
@@ -107,6 +108,11 @@ def _parser():
     add("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     add("--folder", type=Path, help="for the table (default: study; study-quick with --quick)")
     return root, tuple(commands.choices)
+
+
+def _degrees(degrees):
+    """The angle in rad that so many degrees are."""
+    return float(np.radians(float(degrees)))
 
 
 def replication(module):
@@ -138,7 +144,7 @@ def _map(options):
     """dollop map LOG MAP"""
     check_is_map(options.map)
     check_writable(options.map)
-    log = dollop.read_log(options.log, options.topic)
+    log = dollop.read_log(options.log, options.topic, options.fov)
     dollop.OccupancyGrid.from_log(log, options.resolution).save(options.map)
     print(f"wrote {options.map}")
 
@@ -155,7 +161,7 @@ def _user(text):
 def _observe(options):
     """dollop observe LOG MAP"""
     out, picture = _outputs(options)
-    log = dollop.read_log(options.log, options.topic)
+    log = dollop.read_log(options.log, options.topic, options.fov)
     background = dollop.OccupancyGrid.load(options.map)
     found = dollop.observe(log, background, options.user, min_area=options.min_area)
     if found.user is None:
