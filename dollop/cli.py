@@ -80,7 +80,12 @@ def _parser():
     log = argparse.ArgumentParser(add_help=False)
     log.add_argument("log", help="CARMEN log (.log, .log.gz, .clf) or ROS bag")
     log.add_argument("--topic", help="LaserScan topic of a bag, if there are several")
-    log.add_argument("--fov", type=_degrees, metavar="DEGREES", help="field of view, if the log does not state it")
+    log.add_argument(
+        "--fov",
+        type=_degrees,
+        metavar="DEGREES",
+        help="field of view, if the log does not state it",
+    )
 
     def command(run, name, help, *parents):
         parser = commands.add_parser(name, parents=parents, help=help)
@@ -92,15 +97,37 @@ def _parser():
     add("--resolution", type=float, default=0.05, help="m per cell (default: 0.05)")
     add = command(_observe, "observe", "track the user in a laser log", log)
     add("map", help="background map: .yaml (ROS map_server) or .map (CARMEN)")
-    add("--user", type=_user, default="fastest", metavar="WHO", help="fastest (default), a place X,Y or a number")
+    add(
+        "--user",
+        type=_user,
+        default="fastest",
+        metavar="WHO",
+        help="fastest (default), a place X,Y or a number",
+    )
     add("--tracks", metavar="FILE", help="everybody's trajectories, a .csv")
-    add("--min-area", type=float, default=0.01, help="smallest foreground object in m^2 (default: 0.01)")
-    add("--out", default="user.csv", help="the trajectory (default: user.csv); a .png lands beside it")
+    add(
+        "--min-area",
+        type=float,
+        default=0.01,
+        help="smallest foreground object in m^2 (default: 0.01)",
+    )
+    add(
+        "--out",
+        default="user.csv",
+        help="the trajectory (default: user.csv); a .png lands beside it",
+    )
     add = command(_data, "data", "remake the recordings that the notebooks read")
     add("--folder", type=Path, default=Path("data"), help="where to write (default: data)")
-    add = command(_study, "study", "test the paper's claims over many seeds, or the whole chain in random worlds")
+    add = command(
+        _study,
+        "study",
+        "test the paper's claims over many seeds, or the whole chain in random worlds",
+    )
     add(
-        "ids", nargs="*", metavar="claim", help="which (default: all); an unknown one lists them; worlds: random worlds"
+        "ids",
+        nargs="*",
+        metavar="claim",
+        help="which (default: all); an unknown one lists them; worlds: random worlds",
     )
     add("--seeds", type=int, help="how many (default: 100; 300 worlds)")
     add("--first-seed", type=int, default=0, metavar="N", help="of the worlds (default: 0)")

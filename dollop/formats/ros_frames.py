@@ -98,7 +98,12 @@ def planar(place, turn):
     """
     q = np.array([turn.x, turn.y, turn.z, turn.w])
     x, y, z, w = q / max(np.linalg.norm(q), 1e-12)
-    return place.x, place.y, np.arctan2(2 * (x * y + z * w), 1 - 2 * (y * y + z * z)), 1 - 2 * (x * x + y * y)
+    return (
+        place.x,
+        place.y,
+        np.arctan2(2 * (x * y + z * w), 1 - 2 * (y * y + z * z)),
+        1 - 2 * (x * x + y * y),
+    )
 
 
 def laser_poses(path, links, odometry, frame, t):
@@ -138,13 +143,20 @@ def laser_poses(path, links, odometry, frame, t):
     late = np.any([links[name].late(t) for name in chain], axis=0)
     if 2 * late.sum() > len(t):
         text = f"{late.sum()} of {len(t)} scans are more than {LATE:g} s from every transform or odometry"
-        return np.zeros((len(t), 3)), False, (doubtful(path, "poses", f"{text}: every pose is (0, 0, 0)"),)
+        return (
+            np.zeros((len(t), 3)),
+            False,
+            (doubtful(path, "poses", f"{text}: every pose is (0, 0, 0)"),),
+        )
     if late.any():
         text = f"{late.sum()} of {len(t)} poses are a guess: no transform or odometry within {LATE:g} s"
         notes = (*notes, doubtful(path, "poses", text))
     if _name(root) != MAP:
         text = f"the poses are those of the bag's frame {root!r}, by odometry, which drifts"
-        notes = (*notes, Note("poses", f"{text}; dollop.localise finds those on a map", doubt=False))
+        notes = (
+            *notes,
+            Note("poses", f"{text}; dollop.localise finds those on a map", doubt=False),
+        )
     poses, sides, tilt = _along(links, chain, t)
     if tilt > TILTED:
         text = f"the laser is tilted by {np.degrees(tilt):.0f} degrees and taken to be level"

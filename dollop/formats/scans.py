@@ -9,7 +9,16 @@ import numpy as np
 from dollop.checks import Note
 from dollop.formats.files import FormatError, warn_of
 
-__all__ = ["Beams", "Scan", "doubtful", "forgive", "forgive_disorder", "longest_rise", "no_return_from", "usable_scans"]
+__all__ = [
+    "Beams",
+    "Scan",
+    "doubtful",
+    "forgive",
+    "forgive_disorder",
+    "longest_rise",
+    "no_return_from",
+    "usable_scans",
+]
 
 NOMINAL_RATE = 10.0
 """Scans per second of a SICK LMS 200 at 1 degree and 38400 baud: what a log without a usable clock
@@ -346,4 +355,8 @@ def _usable_clock(path, t):
     gap = np.diff(t[keep]).max(initial=0)
     if gap <= LONGEST_GAP:
         return keep, t[keep], ()
-    return keep, t[keep], (doubtful(path, "clock", f"the clock jumps by {gap:g} s from one scan to the next"),)
+    return (
+        keep,
+        t[keep],
+        (doubtful(path, "clock", f"the clock jumps by {gap:g} s from one scan to the next"),),
+    )

@@ -122,7 +122,10 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     True
     """
     by_odometry = _laser_odometry(log, odometry, laser)
-    scans, follower = _Scans(log, background), MonteCarloLocalizer(background, _thinned(log)[1], seed=seed)
+    scans, follower = (
+        _Scans(log, background),
+        MonteCarloLocalizer(background, _thinned(log)[1], seed=seed),
+    )
     search = _Search(scans, by_odometry, follower)
     course = _followed(log, search, by_odometry, follower)
     if not course.located.any():
@@ -423,7 +426,10 @@ def _banded_step(poses, gradient, matrix, steps, trust):
     errors[:, 2] = wrapped(errors[:, 2])
     before, after = _step_derivatives(poses)
     weighted = np.swapaxes(after, 1, 2) * trust[:, None], np.swapaxes(before, 1, 2) * trust[:, None]
-    gradient, matrix = gradient.copy(), matrix + 1e-3 * np.eye(3)  # a scan without a beam has no place
+    gradient, matrix = (
+        gradient.copy(),
+        matrix + 1e-3 * np.eye(3),
+    )  # a scan without a beam has no place
     gradient[1:] += (weighted[0] @ errors[..., None])[..., 0]
     gradient[:-1] += (weighted[1] @ errors[..., None])[..., 0]
     matrix[1:] += weighted[0] @ after
