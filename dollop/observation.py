@@ -357,7 +357,7 @@ class Observer:
             text = f"the scans last {now - begin:.1f} s: what stands is known after {SHORTEST_LOOK:g} s"
             yield Note("short look", text)
         came = {k: when for k, rows in enumerate(groups) if (when := self._came(rows, gone)) > begin + SHORTEST_LOOK}
-        for place, box, when in went(gone, stands[:, :2], people, self.min_area):
+        for place, box, when in went(gone, stands, people, self.min_area):
             near = [k for k in came if abs(came[k] - when) < MOVED_WITHIN]
             to = min(near, key=lambda k: unlike(environment.boxes[k], box), default=None)
             what = f"an object at ({place[0]:.2f}, {place[1]:.2f})"
@@ -425,7 +425,8 @@ def went(gone, stands, people, min_area):
         wide = max(high - low)
         if end - begin < SHORTEST_LOOK or len(group) < 3 or wide**2 < min_area:
             continue
-        if (nearest(group[:, :2], stands) < SAME_PLACE).mean() > 0.3:
+        there_then = stands[stands[:, 4] < end, :2]  # what still stands and is the same, seen badly
+        if np.count_nonzero(nearest(there_then, group[:, :2]) < SAME_PLACE) > len(group) / 2:
             continue
         place = (low + high) / 2
         if not any(was_there(track, place, begin, end) for track in people):
