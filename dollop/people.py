@@ -155,7 +155,15 @@ def candidates(beam, x, y, ranges, pose, step):
         distance = hypot(ux, uy) or 1e-9
         width = min((left - right + 1) * step * distance, WIDEST)
         hidden = 2.0 if before < -EDGE and after < -EDGE else float(after < -EDGE) - float(before < -EDGE)
-        found = (sum_x, sum_y, ux / distance, uy / distance, width, VAGUE if hidden else SURE, hidden)
+        found = (
+            sum_x,
+            sum_y,
+            ux / distance,
+            uy / distance,
+            width,
+            VAGUE if hidden else SURE,
+            hidden,
+        )
         (narrow if width < NARROW else whole).append(found)
     return whole + paired(narrow) if narrow else whole
 
@@ -181,7 +189,21 @@ class Piece:
     Both axes share one covariance, P = [[pxx, pxv], [pxv, pvv]].
     """
 
-    __slots__ = ["x", "y", "vx", "vy", "pxx", "pxv", "pvv", "seen", "rows", "begin", "far", "anchor", "arrived"]
+    __slots__ = [
+        "x",
+        "y",
+        "vx",
+        "vy",
+        "pxx",
+        "pxv",
+        "pvv",
+        "seen",
+        "rows",
+        "begin",
+        "far",
+        "anchor",
+        "arrived",
+    ]
 
     def __init__(self, place, t):
         self.x, self.y, self.vx, self.vy = *place, 0.0, 0.0
@@ -309,9 +331,9 @@ class Followed:
 
 
 def worth_keeping(piece):
-    """Whether a piece may be of somebody's way: seen often enough, and not all in one place."""
+    """Whether a piece may be of somebody's way: seen often enough."""
     n, scans = len(piece.rows) // ROW, piece.rows[-ROW] - piece.rows[0] + 1
-    return n >= 4 and n >= OFTEN * scans and piece.far > 0.25
+    return n >= 4 and n >= OFTEN * scans
 
 
 # ---- what stood, and who walked from there
@@ -522,7 +544,14 @@ def ends_of(rows, t, motion):
     for part in (slice(0, 12), slice(-12, None)):
         place, velocity = smooth(t[scans[part]], middles_of(rows[part]), motion, rows[part, 6])
         k = 0 if part.start == 0 else -1
-        states.append((t[scans[part]][k], place[k], velocity[k], end_covariance(rows[part, 6], t[scans[part]], motion)))
+        states.append(
+            (
+                t[scans[part]][k],
+                place[k],
+                velocity[k],
+                end_covariance(rows[part, 6], t[scans[part]], motion),
+            )
+        )
     return states
 
 
@@ -761,7 +790,10 @@ def bridge(t, places, velocities, when, pace):
     share = np.linspace(0, 1, 101)[:, None]
 
     def curve(swing):
-        leave, reach = share * (1 - share) ** 2 * directions[0], share**2 * (share - 1) * directions[1]
+        leave, reach = (
+            share * (1 - share) ** 2 * directions[0],
+            share**2 * (share - 1) * directions[1],
+        )
         return places[0] + (3 - 2 * share) * share**2 * chord + swing * (leave + reach)
 
     low, high = straight, MOST_SWING * length
