@@ -10,6 +10,7 @@ Sec.  symbol      meaning                                       name
 ====  ==========  ============================================  ===============================
 II                background occupancy grid map                 `OccupancyGrid`
 II                laser scan; no return is inf                  `LaserLog.ranges`
+II                where the laser is on the map                 `localise`
 II                foreground cell: no background near it        `foreground.foreground_mask`
 II    g           value of a cell of the foreground grid        `foreground.ForegroundGrid`
 II                blob: adjacent occupied foreground cells      `foreground.Blobs`
@@ -21,6 +22,9 @@ II                occluded; disappeared after 5 seconds         `Tracker.disappe
 II                user: the fastest foreground object           `tracking.identify_user`
 II                people, each as far as it is surely the same  `people`
 II                what stands, and since when                   `foreground.StandingCells`
+II                people, user, environment of a log            `observe`
+II                the same, scan by scan                        `Observer`
+                  what may be wrong with a result, and why      `Note`
 III   p_n         position on a trajectory                      `trajectory`
 III               laps: walks along one trajectory              `laps`
 III   x_n         position relative to a segment's subgoal      `LDS.step`
@@ -64,7 +68,7 @@ from dollop.laser import LaserLog
 from dollop.lds import LDS
 from dollop.matching import Matching, match
 from dollop.observation import Observation, Observer, observe
-from dollop.robot import Run, Unicycle, perform
+from dollop.robot import Run, Unicycle, localise, perform
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
 from dollop.tracking import Motion, Track, Tracker
@@ -75,5 +79,5 @@ __all__ = [
     "LDS", "Association", "Demonstration", "Environment", "FormatError", "Frames", "LaserLog",
     "Matching", "Motion", "Note", "Observation", "Observer", "OccupancyGrid", "Run", "SequencedLDS", "SubgoalHMM",
     "Task", "Track", "Tracker", "Unicycle", "__version__", "associate", "associate_with_frames",
-    "laps", "learn", "match", "observe", "perform", "read_log", "write_log",
+    "laps", "learn", "localise", "match", "observe", "perform", "read_log", "write_log",
 ]  # fmt: skip

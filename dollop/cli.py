@@ -80,6 +80,12 @@ def _parser():
     log = argparse.ArgumentParser(add_help=False)
     log.add_argument("log", help="CARMEN log (.log, .log.gz, .clf) or ROS bag")
     log.add_argument("--topic", help="LaserScan topic of a bag, if there are several")
+    log.add_argument(
+        "--fov",
+        type=_degrees,
+        metavar="DEGREES",
+        help="field of view, if the log does not state it",
+    )
 
     def command(run, name, help, *parents):
         parser = commands.add_parser(name, parents=parents, help=help)
@@ -91,15 +97,37 @@ def _parser():
     add("--resolution", type=float, default=0.05, help="m per cell (default: 0.05)")
     add = command(_observe, "observe", "track the user in a laser log", log)
     add("map", help="background map: .yaml (ROS map_server) or .map (CARMEN)")
-    add("--user", type=_user, default="fastest", metavar="WHO", help="fastest (default), a place X,Y or a number")
+    add(
+        "--user",
+        type=_user,
+        default="fastest",
+        metavar="WHO",
+        help="fastest (default), a place X,Y or a number",
+    )
     add("--tracks", metavar="FILE", help="everybody's trajectories, a .csv")
-    add("--min-area", type=float, default=0.01, help="smallest foreground object in m^2 (default: 0.01)")
-    add("--out", default="user.csv", help="the trajectory (default: user.csv); a .png lands beside it")
+    add(
+        "--min-area",
+        type=float,
+        default=0.01,
+        help="smallest foreground object in m^2 (default: 0.01)",
+    )
+    add(
+        "--out",
+        default="user.csv",
+        help="the trajectory (default: user.csv); a .png lands beside it",
+    )
     add = command(_data, "data", "remake the recordings that the notebooks read")
     add("--folder", type=Path, default=Path("data"), help="where to write (default: data)")
-    add = command(_study, "study", "test the paper's claims over many seeds, or the whole chain in random worlds")
+    add = command(
+        _study,
+        "study",
+        "test the paper's claims over many seeds, or the whole chain in random worlds",
+    )
     add(
-        "ids", nargs="*", metavar="claim", help="which (default: all); an unknown one lists them; worlds: random worlds"
+        "ids",
+        nargs="*",
+        metavar="claim",
+        help="which (default: all); an unknown one lists them; worlds: random worlds",
     )
     add("--seeds", type=int, help="how many (default: 100; 300 worlds)")
     add("--first-seed", type=int, default=0, metavar="N", help="of the worlds (default: 0)")
@@ -107,6 +135,11 @@ def _parser():
     add("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     add("--folder", type=Path, help="for the table (default: study; study-quick with --quick)")
     return root, tuple(commands.choices)
+
+
+def _degrees(degrees):
+    """The angle in rad that so many degrees are."""
+    return float(np.radians(float(degrees)))
 
 
 def replication(module):
@@ -138,7 +171,7 @@ def _map(options):
     """dollop map LOG MAP"""
     check_is_map(options.map)
     check_writable(options.map)
-    log = dollop.read_log(options.log, options.topic)
+    log = dollop.read_log(options.log, options.topic, options.fov)
     dollop.OccupancyGrid.from_log(log, options.resolution).save(options.map)
     print(f"wrote {options.map}")
 
@@ -155,7 +188,7 @@ def _user(text):
 def _observe(options):
     """dollop observe LOG MAP"""
     out, picture = _outputs(options)
-    log = dollop.read_log(options.log, options.topic)
+    log = dollop.read_log(options.log, options.topic, options.fov)
     background = dollop.OccupancyGrid.load(options.map)
     found = dollop.observe(log, background, options.user, min_area=options.min_area)
     if found.user is None:

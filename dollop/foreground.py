@@ -497,7 +497,11 @@ class StandingCells:
         reach = max(1, round(TOUCH / background.resolution))
         near = np.arange(-reach, reach + 1)
         self._round = (near[:, None] * background.occupancy.shape[1] + near).ravel()
-        self.known_since, self._marked, self._known = np.full(size, np.inf), None, np.zeros(0, np.intp)
+        self.known_since, self._marked, self._known = (
+            np.full(size, np.inf),
+            None,
+            np.zeros(0, np.intp),
+        )
         self.gone = {}
 
     def due(self, t):
@@ -571,7 +575,10 @@ class StandingCells:
         self._row[self._cells[: self._count][rows]] = -1
         kept = np.flatnonzero(~rows)
         self._count = len(kept)
-        self._cells[: self._count], self._table[: self._count] = self._cells[kept], self._table[kept]
+        self._cells[: self._count], self._table[: self._count] = (
+            self._cells[kept],
+            self._table[kept],
+        )
         self._row[self._cells[: self._count]] = np.arange(self._count)
 
     def _mark(self):

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 from dollop.checks import check_positive, checked_array, put_in
-from dollop.formats import carmen_map
+from dollop.formats import carmen_map, ros_bag
 from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, from_file
 
@@ -136,13 +136,15 @@ class OccupancyGrid:
 
     @classmethod
     def load(cls, path):
-        """Read a map of ROS map_server or of CARMEN, as its name says.
+        """Read a map of ROS map_server, of CARMEN or of a ROS bag, as its name says.
 
         Parameters
         ----------
         path : str or Path
             `.yaml` or `.yml`, which names its picture, PGM or PNG: ROS
-            (http://wiki.ros.org/map_server); `.map`, packed or not: CARMEN (`map_io.h`).
+            (http://wiki.ros.org/map_server); `.map`, packed or not: CARMEN (`map_io.h`); `.bag`,
+            `.mcap`, `.db3` or the folder of a ROS 2 bag: the map that was sent on `/map`, or on the
+            only topic of nav_msgs/OccupancyGrid.
 
         Returns
         -------
@@ -153,7 +155,8 @@ class OccupancyGrid:
         FormatError
             If the file is not what its name says.
         """
-        return from_file(path, cls, *_format_of(path).read_map(path))
+        form = ros_bag if ros_bag.is_bag(path) else _format_of(path)
+        return from_file(path, cls, *form.read_map(path))
 
     def save(self, path):
         """Write a map of ROS map_server or of CARMEN, as its name says.

@@ -224,7 +224,10 @@ def lap_cuts(points):
     track, step, doubt = resample(corners, n), walked[-1] / (n - 1), ""
     for lag in islice(lap_lags(track), TRIALS):
         cuts = cuts_at(points, walked, corners, lag * step)
-        fault, after = why_too_few(walked, cuts), f"it seems to repeat itself after {lag * step:.1f} m"
+        fault, after = (
+            why_too_few(walked, cuts),
+            f"it seems to repeat itself after {lag * step:.1f} m",
+        )
         if not fault:
             unlike = why_unlike(points, walked, cuts)
             return ([0, len(points) - 1], f"{after}, but {unlike}") if unlike else (cuts, "")

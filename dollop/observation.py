@@ -36,7 +36,15 @@ from dollop.people import (
 from dollop.tracking import Motion, Track, Tracker, identify_user, track_objects, user_track
 from dollop.trajectory import arc_length
 
-__all__ = ["METHODS", "STATIC_EVERY", "Observation", "Observer", "foreground_hits", "observe", "static_boxes"]
+__all__ = [
+    "METHODS",
+    "STATIC_EVERY",
+    "Observation",
+    "Observer",
+    "foreground_hits",
+    "observe",
+    "static_boxes",
+]
 
 STATIC_EVERY = 5
 """The paper's slow grid looks at every fifth scan: what is static is still there then."""
@@ -245,7 +253,10 @@ class Observer:
         column, row = in_cells(x, y, self.background.origin, self.background.resolution)
         height, width = self.background.occupancy.shape
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)  # nan and inf are not
-        column, row = np.where(inside, column, 0).astype(np.intp), np.where(inside, row, 0).astype(np.intp)
+        column, row = (
+            np.where(inside, column, 0).astype(np.intp),
+            np.where(inside, row, 0).astype(np.intp),
+        )
         cells = row * width + column
         kind = np.where(inside, self._class[cells], 0)
         self.returned += int(returned.sum())
@@ -295,8 +306,13 @@ class Observer:
         chosen = choose(people, self.user)
         user = None if chosen is None else people[chosen]
         who = None if chosen is None else persons[walked[chosen]]
-        environment, groups = self._environment(stands, people, user)
-        notes = (*notes, *self._map_notes(), *self._object_notes(environment, groups, stands, gone, people))
+        environment, groups, in_part = self._environment(stands, people, user)
+        notes = (
+            *notes,
+            *self._map_notes(),
+            *self._object_notes(environment, groups, stands, gone, people),
+        )
+        notes += tuple(map(part_note, environment.centres[in_part]))
         if user is not None:
             notes += tuple(user_notes(user, who, people, tracks, self.user))
         losses = 0 if who is None else len(who.gaps)
@@ -312,7 +328,10 @@ class Observer:
         """Whether the map explains the scans, and whether they are often enough."""
         period = float(np.median(np.diff(self.followed.t))) if len(self.followed.t) > 1 else 0.0
         if period > SLOWEST:
-            yield Note("slow scans", f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s")
+            yield Note(
+                "slow scans",
+                f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s",
+            )
         share = self.moving / max(self.later, 1)
         if share > MOST_MOVING:
             text = f"{share:.0%} of the readings are on nothing that stands or that the map knows"
@@ -320,16 +339,16 @@ class Observer:
             yield Note("map", f"{text} (at most {MOST_MOVING:.0%}): {reason}")
 
     def _environment(self, stands, people, user):
-        """The objects that stand at the end, and the cells (S_k, 6) of each."""
+        """The objects that stand at the end, the cells (S_k, 6) of each, and which are seen in part."""
         for track in people:
             since = arrival(track)
             if track.t[-1] > self.followed.t[-1] - 1.0 and (track is user or not slides(track)):
                 there = np.linalg.norm(stands[:, :2] - track.positions[-1], axis=1) < STANDING_REACH
                 stands = stands[~(there & (stands[:, 4] >= since - 0.5))]
         found = standing_boxes(stands[:, :2], stands[:, 2:4], self.step_angle, self._scan, self.min_area)
-        boxes, assumed, hidden, groups = found
+        boxes, assumed, in_part, groups = found
         seen = Seen(self.floor.grid(), self.floor.origin, self.floor.resolution)
-        return Environment(boxes, seen, assumed), [stands[rows] for rows in groups]
+        return Environment(boxes, seen, assumed), [stands[rows] for rows in groups], in_part
 
     def _object_notes(self, environment, groups, stands, gone, people):
         """What came, went or moved meanwhile, and what was seen too shortly or in part."""
@@ -338,7 +357,7 @@ class Observer:
             text = f"the scans last {now - begin:.1f} s: what stands is known after {SHORTEST_LOOK:g} s"
             yield Note("short look", text)
         came = {k: when for k, rows in enumerate(groups) if (when := self._came(rows, gone)) > begin + SHORTEST_LOOK}
-        for place, box, when in went(gone, stands[:, :2], people, self.min_area):
+        for place, box, when in went(gone, stands, people, self.min_area):
             near = [k for k in came if abs(came[k] - when) < MOVED_WITHIN]
             to = min(near, key=lambda k: unlike(environment.boxes[k], box), default=None)
             what = f"an object at ({place[0]:.2f}, {place[1]:.2f})"
@@ -347,13 +366,15 @@ class Observer:
             else:
                 x, y = environment.centres[to]
                 yield Note(
-                    "object moved", f"{what} was moved to ({x:.2f}, {y:.2f}) {when - begin:.1f} s after the start"
+                    "object moved",
+                    f"{what} was moved to ({x:.2f}, {y:.2f}) {when - begin:.1f} s after the start",
                 )
                 del came[to]
         for k, when in came.items():
             x, y = environment.centres[k]
             yield Note(
-                "object came", f"an object stands at ({x:.2f}, {y:.2f}) since {when - begin:.1f} s after the start"
+                "object came",
+                f"an object stands at ({x:.2f}, {y:.2f}) since {when - begin:.1f} s after the start",
             )
 
     def _came(self, cells, gone):
@@ -363,6 +384,12 @@ class Observer:
         if np.median(self.floor.first_at(places)) < since - 0.5 and not (gone[before, 4] < since - 0.5).any():
             return float(since)
         return self.followed.t[0]
+
+
+def part_note(place):
+    """That an object at a place (2,) is seen in part."""
+    where = f"the object at ({place[0]:.2f}, {place[1]:.2f})"
+    return Note("in part", f"{where} goes on behind something, or out of view: it may be larger", False)
 
 
 def arrival(track):
@@ -375,7 +402,10 @@ def slides(track):
     """Whether somebody may be an object that is moved: it stands, goes slowly straight on, and stands."""
     still = track.speeds < 0.15
     at_ends = still[track.t < track.t[0] + 1.0].mean() > 0.5 and still[track.t > track.t[-1] - 1.0].mean() > 0.5
-    way, straight = arc_length(track.positions)[-1], np.linalg.norm(track.positions[-1] - track.positions[0])
+    way, straight = (
+        arc_length(track.positions)[-1],
+        np.linalg.norm(track.positions[-1] - track.positions[0]),
+    )
     return bool(at_ends and moving_speed(track) < SLIDES and straight > 0.8 * way)
 
 
@@ -395,7 +425,8 @@ def went(gone, stands, people, min_area):
         wide = max(high - low)
         if end - begin < SHORTEST_LOOK or len(group) < 3 or wide**2 < min_area:
             continue
-        if (nearest(group[:, :2], stands) < SAME_PLACE).mean() > 0.3:
+        there_then = stands[stands[:, 4] < end, :2]  # what still stands and is the same, seen badly
+        if np.count_nonzero(nearest(there_then, group[:, :2]) < SAME_PLACE) > len(group) / 2:
             continue
         place = (low + high) / 2
         if not any(was_there(track, place, begin, end) for track in people):
@@ -481,19 +512,31 @@ def user_notes(user, person, people, tracks, choice):
             speeds = f"{mine:.2f} and {max(near):.2f} m/s, less than {ALIKE:g} apart"
             yield Note("people", f"{1 + len(near)} people walk about as fast ({speeds})")
     for when in person.doubts[:1]:
-        yield Note("exchange", f"{when - user.t[0]:.1f} s after the user was first seen somebody else may have gone on")
+        yield Note(
+            "exchange",
+            f"{when - user.t[0]:.1f} s after the user was first seen somebody else may have gone on",
+        )
     for other in tracks:
         gap, way = could_be(user, other), arc_length(other.positions)[-1]
         if gap is not None and way > LEFT_OUT:
-            yield Note("pieces", f"somebody who was seen {gap:.1f} s apart and walked {way:.1f} m may be the user too")
+            yield Note(
+                "pieces",
+                f"somebody who was seen {gap:.1f} s apart and walked {way:.1f} m may be the user too",
+            )
     longest = np.diff(person.gaps).max(initial=0)
     if longest > LONGEST_BRIDGE:
-        yield Note("gap", f"the user was out of sight for {longest:.1f} s at a time (at most {LONGEST_BRIDGE:g})")
+        yield Note(
+            "gap",
+            f"the user was out of sight for {longest:.1f} s at a time (at most {LONGEST_BRIDGE:g})",
+        )
     seen = 1 - user.occluded.mean()
     if seen < LEAST_SEEN:
         yield Note("seen", f"the user was in sight for {seen:.0%} of the time (at least {LEAST_SEEN:.0%})")
     if user.speeds.max() > TOP_SPEED:
-        yield Note("speed", f"the user would have walked at {user.speeds.max():.1f} m/s (at most {TOP_SPEED:g})")
+        yield Note(
+            "speed",
+            f"the user would have walked at {user.speeds.max():.1f} m/s (at most {TOP_SPEED:g})",
+        )
 
 
 def could_be(user, other):
@@ -505,7 +548,15 @@ def could_be(user, other):
 
 
 def observe_as_paper(
-    log, background, background_radius=0.20, gain=0.6, static_gain=0.1, min_area=0.01, stride=0.0, tracker=None, seed=0
+    log,
+    background,
+    background_radius=0.20,
+    gain=0.6,
+    static_gain=0.1,
+    min_area=0.01,
+    stride=0.0,
+    tracker=None,
+    seed=0,
 ):
     """Observe a demonstration as the paper does (Sec. II): `observe` with method="paper".
 

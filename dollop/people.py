@@ -90,8 +90,8 @@ PRIOR = 3.0
 """Log odds, before anything is seen, that who comes into sight is who was last seen."""
 DOUBTFUL = 2.0
 """Log odds over the next best assignment below which a joint is not made."""
-END_SD, END_SPEED_SD = 1.3, 0.3
-"""How much worse than its measurements the place at the end of a piece is known, and its velocity in m/s."""
+END_SD = 1.3
+"""How much worse than its measurements the place at the end of a piece is known."""
 TURNS, ABRUPT = 0.1, 10.0
 """Share of the joints at which somebody turns sharply, and how much more noise that is."""
 CLOSE, BESIDE = 0.8, 0.6
@@ -156,7 +156,15 @@ def candidates(beam, x, y, ranges, pose, step):
         angle = (left - right + 1) * step
         width = min(angle * distance / max(1 - pi / 8 * angle, 0.5), WIDEST)  # of a disc, whose edges lie deeper
         hidden = 2.0 if before < -EDGE and after < -EDGE else float(after < -EDGE) - float(before < -EDGE)
-        found = (sum_x, sum_y, ux / distance, uy / distance, width, VAGUE if hidden else SURE, hidden)
+        found = (
+            sum_x,
+            sum_y,
+            ux / distance,
+            uy / distance,
+            width,
+            VAGUE if hidden else SURE,
+            hidden,
+        )
         (narrow if width < NARROW else whole).append(found)
     return whole + paired(narrow) if narrow else whole
 
@@ -182,7 +190,21 @@ class Piece:
     Both axes share one covariance, P = [[pxx, pxv], [pxv, pvv]].
     """
 
-    __slots__ = ["x", "y", "vx", "vy", "pxx", "pxv", "pvv", "seen", "rows", "begin", "far", "anchor", "arrived"]
+    __slots__ = [
+        "x",
+        "y",
+        "vx",
+        "vy",
+        "pxx",
+        "pxv",
+        "pvv",
+        "seen",
+        "rows",
+        "begin",
+        "far",
+        "anchor",
+        "arrived",
+    ]
 
     def __init__(self, place, t):
         self.x, self.y, self.vx, self.vy = *place, 0.0, 0.0
@@ -310,9 +332,9 @@ class Followed:
 
 
 def worth_keeping(piece):
-    """Whether a piece may be of somebody's way: seen often enough, and not all in one place."""
+    """Whether a piece may be of somebody's way: seen often enough."""
     n, scans = len(piece.rows) // ROW, piece.rows[-ROW] - piece.rows[0] + 1
-    return n >= 4 and n >= OFTEN * scans and piece.far > 0.25
+    return n >= 4 and n >= OFTEN * scans
 
 
 # ---- what stood, and who walked from there
@@ -365,12 +387,12 @@ def together(gone):
 def followed_there(group, pieces, t):
     """Whether a piece was where a group of cells (G, 6) stood for most of that time."""
     begin, end = group[:, 4].min(), np.median(group[:, 5])
+    when = np.linspace(begin, end, 20)
     for rows in pieces:
-        when = t[rows[:, 0].astype(int)]
-        there = (
-            (when >= begin) & (when <= end) & (np.linalg.norm(rows[:, 1:3] - group[:, :2].mean(axis=0), axis=1) < ALONE)
-        )
-        if there.any() and np.ptp(when[there]) > 0.7 * (end - begin):
+        lived = t[rows[:, 0].astype(int)]
+        there = np.column_stack([np.interp(when, lived, rows[:, axis]) for axis in (1, 2)])
+        near = np.linalg.norm(there - group[:, :2].mean(axis=0), axis=1) < ALONE
+        if (near & (when >= lived[0] - 0.1) & (when <= lived[-1] + 0.1)).mean() > 0.7:
             return True
     return False
 
@@ -523,9 +545,25 @@ def ends_of(rows, t, motion):
     for part in (slice(0, 12), slice(-12, None)):
         place, velocity = smooth(t[scans[part]], middles_of(rows[part]), motion, rows[part, 6])
         k = 0 if part.start == 0 else -1
-        sd = END_SD * rows[part, 6].mean()
-        states.append((t[scans[part]][k], place[k], velocity[k], np.diag([sd**2, END_SPEED_SD**2])))
+        states.append(
+            (
+                t[scans[part]][k],
+                place[k],
+                velocity[k],
+                end_covariance(rows[part, 6], t[scans[part]], motion),
+            )
+        )
     return states
+
+
+def end_covariance(sd, t, motion):
+    """Covariance (2, 2), in m and m/s, of the state at the end of a piece.
+
+    That of a Kalman filter that has settled, of noise q with measurements of variance r every dt:
+    the velocity has sqrt(2) q^(3/4) (r dt)^(1/4).
+    """
+    r, dt = np.mean(sd) ** 2, max(float(np.median(np.diff(t))), 1e-3)
+    return np.diag([END_SD**2 * r, np.sqrt(2) * motion.noise**0.75 * (r * dt) ** 0.25])
 
 
 def log_odds(last, first, area, way, motion):
@@ -753,7 +791,10 @@ def bridge(t, places, velocities, when, pace):
     share = np.linspace(0, 1, 101)[:, None]
 
     def curve(swing):
-        leave, reach = share * (1 - share) ** 2 * directions[0], share**2 * (share - 1) * directions[1]
+        leave, reach = (
+            share * (1 - share) ** 2 * directions[0],
+            share**2 * (share - 1) * directions[1],
+        )
         return places[0] + (3 - 2 * share) * share**2 * chord + swing * (leave + reach)
 
     low, high = straight, MOST_SWING * length

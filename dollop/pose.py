@@ -7,7 +7,7 @@ from math import cos, nextafter, pi, sin
 
 import numpy as np
 
-__all__ = ["motion_between", "moved_pose", "rotation", "wrapped"]
+__all__ = ["between", "composed", "motion_between", "moved_pose", "poses_at", "rotation", "wrapped"]
 
 _LEAST = nextafter(-pi, 0)  # the least angle above -pi
 
@@ -114,3 +114,79 @@ def motion_between(before, after):
     dx, dy, turn = np.subtract(after, before)
     turn = wrapped(turn)
     return np.array([*(rotation(-before[2] - turn / 2) @ (dx, dy)), turn])
+
+
+def composed(outer, inner):
+    """Poses that are told in the frame of other poses, in the frame that those are told in.
+
+    Parameters
+    ----------
+    outer, inner : (..., 3) array_like
+        x, y in m, theta in rad.
+
+    Returns
+    -------
+    (..., 3) float array
+        x, y in m, theta in rad, wrapped.
+
+    Examples
+    --------
+    A laser 0.2 m ahead of a robot that looks to the left.
+
+    >>> composed([1.0, 2.0, np.pi / 2], [0.2, 0.0, 0.0]).round(6).tolist()
+    [1.0, 2.2, 1.570796]
+    """
+    outer, inner = np.broadcast_arrays(np.asarray(outer, float), np.asarray(inner, float))
+    turned = (rotation(outer[..., 2]) @ inner[..., :2, None])[..., 0]
+    return np.concatenate([outer[..., :2] + turned, wrapped(outer[..., 2:] + inner[..., 2:])], axis=-1)
+
+
+def between(before, after):
+    """Poses in the frame of other poses: `composed(before, between(before, after))` is `after`.
+
+    Parameters
+    ----------
+    before, after : (..., 3) array_like
+        x, y in m, theta in rad.
+
+    Returns
+    -------
+    (..., 3) float array
+        x, y in m, theta in rad, wrapped.
+
+    Examples
+    --------
+    >>> between([1.0, 2.0, np.pi / 2], [1.0, 2.2, np.pi / 2]).round(6).tolist()
+    [0.2, 0.0, 0.0]
+    """
+    before, after = np.broadcast_arrays(np.asarray(before, float), np.asarray(after, float))
+    way = (rotation(-before[..., 2]) @ (after - before)[..., :2, None])[..., 0]
+    return np.concatenate([way, wrapped((after - before)[..., 2:])], axis=-1)
+
+
+def poses_at(t, times, poses):
+    """Poses at other times, interpolated: the place along a straight line, the heading the shorter way.
+
+    Parameters
+    ----------
+    t : (T,) array_like
+        When in s.
+    times : (N,) float array
+        When the poses were, in s, increasing.
+    poses : (N, 3) float array
+        x, y in m, theta in rad.
+
+    Returns
+    -------
+    (T, 3) float array
+        Before the first time and after the last as there; theta wrapped.
+
+    Examples
+    --------
+    >>> poses_at([0.5, 9.0], np.array([0.0, 1.0]), np.array([[0, 0, 3.0], [2, 0, -3.0]])).round(3).tolist()
+    [[1.0, 0.0, 3.142], [2.0, 0.0, -3.0]]
+    """
+    columns = *poses.T[:2], np.unwrap(poses[:, 2])
+    found = np.stack([np.interp(t, times, column) for column in columns], axis=-1)
+    found[:, 2] = wrapped(found[:, 2])
+    return found

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dollop.pose import motion_between, moved_pose, rotation, wrapped
+from dollop.pose import between, composed, motion_between, moved_pose, poses_at, rotation, wrapped
 
 ANGLES = st.floats(-1e3, 1e3)
 POSES = st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-3.1, 3.1))
@@ -78,3 +78,32 @@ def test_a_full_circle_in_small_arcs_comes_back():
     for _ in range(1000):
         pose = moved_pose(pose, 2 * np.pi / 1000, 2 * np.pi / 1000)
     np.testing.assert_allclose(pose, [1.0, 0.0, np.pi / 2], atol=1e-9)
+
+
+@given(POSES, POSES)
+def test_what_lies_between_leads_from_one_to_the_other(before, after):
+    """Between and composed undo each other, and composing is multiplying by a matrix."""
+    np.testing.assert_allclose(composed(before, between(before, after))[:2], after[:2], atol=1e-6)
+    assert np.exp(1j * composed(before, between(before, after))[2]) == pytest.approx(np.exp(1j * after[2]))
+    x, y, theta = before
+    matrix = np.block([[rotation(theta), np.array([[x], [y]])], [0, 0, 1]])
+    np.testing.assert_allclose(composed(before, after)[:2], (matrix @ [*after[:2], 1])[:2], atol=1e-6)
+
+
+def test_many_poses_are_composed_with_one():
+    """Leading axes are broadcast, whichever of the two has them."""
+    many = np.random.default_rng(0).normal(size=(4, 5, 3))
+    one = np.array([0.3, -0.2, 3.0])
+    for outer, inner in ((many, one), (one, many)):
+        found = composed(outer, inner)
+        assert found.shape == (4, 5, 3)
+        pair = [np.broadcast_to(each, (4, 5, 3))[2, 3] for each in (outer, inner)]
+        np.testing.assert_allclose(found[2, 3], composed(*pair))
+
+
+def test_poses_between_two_times():
+    """Half-way in time is half-way in place and heading, over the seam too; outside nothing changes."""
+    poses = np.array([[0.0, 0.0, 3.0], [1.0, 2.0, -3.0], [1.0, 2.0, -2.0]])
+    found = poses_at([-5.0, 0.0, 0.5, 1.5, 2.0, 9.0], np.arange(3.0), poses)
+    middle = [0.5, 1.0, np.pi]
+    np.testing.assert_allclose(found, [poses[0], poses[0], middle, [1, 2, -2.5], poses[2], poses[2]])

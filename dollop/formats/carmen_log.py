@@ -8,53 +8,32 @@ log began.
 import gzip
 import io
 from contextlib import nullcontext
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from dollop.checks import check_positive, checked_array
-from dollop.formats.files import FormatError, from_file, read_bytes, warn_of, whole_file
-from dollop.formats.scans import Beams, Scan, forgive, longest_rise, usable_scans
+from dollop.checks import check_positive, checked_array, checked_number
+from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
+from dollop.formats.odometry import Odometry
+from dollop.formats.scans import Beams, Scan, doubtful, forgive, forgive_disorder, no_return_from, usable_scans
 from dollop.laser import LaserLog
 from dollop.pose import wrapped
 
-__all__ = ["Odometry", "read_log", "read_odometry", "write_log"]
+__all__ = ["read_log", "read_odometry", "write_log"]
 
 FULL_SCALES = ((8.183, 8.191), (16.375, 16.383), (32.759, 32.767), (51.14, 51.16), (80.0, np.inf))
 """Readings in m that are a code and no distance: the last nine values of 13, 14 and 15 bits of 1 mm
 (the error codes of the SICK LMS 200), 10 bits of 5 cm, and all from 80 m on, which CARMEN takes for
 the maximum range of a FLASER line (`readlog.c`; 13 bits of 1 cm end at 81.91 m)."""
 
+PER_DEGREE = {180: 1, 181: 1, 360: 2, 361: 2, 400: 4, 401: 4}
+"""Beams per degree by the numbers of beams that CARMEN's reader knows."""
+
 SICK_TYPES, UNKNOWN_TYPE = (0, 1), 99
 """`laser_type` of the SICK LMS and PLS, and of a laser CARMEN has no name for."""
 
 
-@dataclass(frozen=True, eq=False)
-class Odometry:
-    """What the wheels report.
-
-    Attributes
-    ----------
-    t : (N,) float array
-        Time in s, increasing.
-    poses : (N, 3) float array
-        Robot in the odometry's own frame: x, y in m, theta in rad, wrapped to (-pi, pi].
-    velocities : (N, 2) float array
-        Forward in m/s, turning in rad/s.
-    """
-
-    t: np.ndarray
-    poses: np.ndarray
-    velocities: np.ndarray
-
-    def __len__(self):
-        return len(self.t)
-
-    def __repr__(self):
-        return f"Odometry of {len(self)} messages in {np.ptp(self.t):.1f} s"
-
-
-def read_log(path, max_range=None):
+def read_log(path, max_range=None, fov=None):
     """Laser scans of a CARMEN log, plain or gzipped.
 
     ROBOTLASER1 messages are read where there are any, since they state their own geometry, and
@@ -69,12 +48,17 @@ def read_log(path, max_range=None):
     max_range : float, optional
         Range in m from which on a reading means that nothing came back; by default what the message
         states, or for FLASER, which states nothing, the full scale that the largest reading of the
-        log belongs to.
+        log belongs to; or less, where readings pile up (`dollop.formats.scans.no_return_from`).
+    fov : float, optional
+        Field of view in rad of a log of FLASER messages, which do not state it: the beams are spread
+        evenly over it, the first at -fov/2 and the last at +fov/2. By default that of CARMEN's
+        reader, which goes by the number of beams; of a number that CARMEN does not know it is a
+        guess.
 
     Returns
     -------
     LaserLog
-        `inf` where nothing came back.
+        `inf` where nothing came back; notes on sensor and clock where there is something to say.
 
     Raises
     ------
@@ -82,47 +66,73 @@ def read_log(path, max_range=None):
         If the file is no CARMEN log, holds no scan, or more than a few scans are broken
         (`dollop.formats.scans.forgive`).
     ValueError
-        If `max_range` is not positive and finite.
+        If `max_range` is not positive and finite, if `fov` is not an angle up to a full turn, or is
+        told of messages that state their own.
 
     Warns
     -----
     UserWarning
-        If broken scans were left out, if the clock is wrong (`dollop.formats.scans.usable_scans`),
-        or if so many readings of FLASER messages equal the largest one that it may be a full scale
-        that is not known here.
+        If broken scans were left out, or a note puts the log in doubt: if the clock is wrong
+        (`dollop.formats.scans.usable_scans`), if the field of view is a guess, or if readings pile
+        up that may be distances.
     """
     if max_range is not None:
         check_positive("max_range", max_range)
-    scans, t = usable_scans(path, *_scans(path))
+    if fov is not None:
+        checked_number("fov", fov, 1e-6, 2 * np.pi)
+    scans, t, notes = usable_scans(path, *_scans(path, fov))
     beams, ranges = scans[0].beams, np.array([scan.ranges for scan in scans])
-    limit = max_range or _no_return_from(path, ranges, beams)
+    if fov is None:
+        notes += _field_notes(path, beams, ranges)
+    limit = max_range
+    if limit is None:
+        limit, further = no_return_from(path, ranges, beams.angles, _known_limit(ranges, beams))
+        notes += further
     ranges = np.where((ranges >= limit - 1e-9) | (ranges == 0), np.inf, ranges)
     poses = [scan.pose for scan in scans]
-    return from_file(path, LaserLog, t, ranges, beams.angles, poses, limit)
+    return from_file(path, LaserLog, t, ranges, beams.angles, poses, limit, notes)
 
 
-def _no_return_from(path, ranges, beams):
-    """Smallest reading that is no distance."""
-    stated, largest = beams.max_range, ranges.max()
-    reach = stated or largest
+def _known_limit(ranges, beams):
+    """Smallest reading that is no distance, by what the file states and by the full scales."""
+    reach = beams.max_range or ranges.max()
     code = next(low for low, high in FULL_SCALES if reach <= high + 1e-9)
-    if stated:
-        return min(stated, code) if beams.is_sick else stated
-    share = (ranges == largest).mean()
-    if largest < code and ranges.size > 1000 and share > 0.02:
-        suspicion = f"{share:.0%} of the readings are exactly {largest} m, the largest"
-        remedy = f"read it with dollop.formats.carmen_log.read_log(path, max_range={largest})"
-        warn_of(path, f"{suspicion}; if that means that nothing came back, {remedy}")
-    return code
+    if beams.max_range is None:
+        return code
+    return min(beams.max_range, code) if beams.is_sick else beams.max_range
 
 
-def _scans(path):
+def _field_notes(path, beams, ranges):
+    """Notes on a field of view that the file does not state, if it is in doubt."""
+    if beams.max_range is not None:  # a message that states one states both
+        return ()
+    field = f"{np.degrees(beams.angles[-1] - beams.angles[0]):.4g} degrees"
+    remedy = "say it if they do not: read_log(path, fov=...) in rad, --fov in degrees"
+    if beams.count not in PER_DEGREE:
+        text = f"{beams.count} beams are taken to spread over {field}, which the file does not state; {remedy}"
+        return (doubtful(path, "sensor", text),)
+    if beams.count in (360, 361) and _closes(ranges):
+        text = f"{beams.count} beams are taken to spread over {field}, but the first and the last see the same"
+        return (doubtful(path, "sensor", f"{text}, as those of a full turn do; {remedy}"),)
+    return ()
+
+
+def _closes(ranges):
+    """Whether the first beam and the last one read alike, as beams beside each other do."""
+    steps = np.abs(np.diff(ranges, axis=1, append=ranges[:, :1]))
+    return np.median(steps[:, -1]) <= 2 * np.median(steps[:, :-1])
+
+
+def _scans(path, fov):
     """All good scans of the preferred message by their line, and the reason of the broken ones."""
     content = read_bytes(path)
     if b"\0" in content[:4096]:
         raise FormatError("binary data, where a CARMEN log is text", path)
-    for name, parse in ((b"ROBOTLASER1", _parse_robotlaser), (b"FLASER", _parse_flaser)):
+    parsers = {b"ROBOTLASER1": _parse_robotlaser, b"FLASER": partial(_parse_flaser, fov=fov)}
+    for name, parse in parsers.items():
         good, bad = _messages(content, name, parse)
+        if good and fov is not None and name != b"FLASER":
+            raise ValueError(f"{path}: ROBOTLASER1 messages state their field of view, got fov={fov:g}")
         if good:
             return good, bad
         forgive(path, bad, len(bad))  # which it refuses, if there is any
@@ -141,17 +151,17 @@ def _messages(content, name, parse):
     return good, bad
 
 
-def _parse_flaser(fields):
+def _parse_flaser(fields, fov=None):
     """`FLASER count [ranges] laser_x laser_y laser_theta robot_x robot_y robot_theta time host
     logger_time`.
     """
     count = _count(fields, 1)
     _check_ending(fields, 9 + count)
-    return _scan(_flaser_beams(count), fields[2 : 2 + count], fields[2 + count : 9 + count])
+    return _scan(_flaser_beams(count, fov), fields[2 : 2 + count], fields[2 + count : 9 + count])
 
 
-def _flaser_beams(count):
-    """Beams of a FLASER line, which does not state their bearings.
+def _flaser_beams(count, fov=None):
+    """Beams of a FLASER line, which does not state their bearings, over `fov` in rad if it is told.
 
     CARMEN's reader guesses them from their number: 180 or 181 are 1 degree apart, 360 or 361 half a
     degree, 400 or 401 a quarter (100 degrees in all); the even counts lack the last beam; any other
@@ -159,7 +169,10 @@ def _flaser_beams(count):
     in `readlog.c`). The first beam is at -90 degrees. In a scan of 100 degrees it is at -50 here,
     where CARMEN leaves it at -90 too, which no such laser does.
     """
-    per_degree = {180: 1, 181: 1, 360: 2, 361: 2, 400: 4, 401: 4}.get(count)
+    if fov is not None:
+        step = fov / max(count - 1, 1)
+        return Beams(count, -step * (count - 1) / 2, step, None, is_sick=True)
+    per_degree = PER_DEGREE.get(count)
     step = np.deg2rad(1 / per_degree if per_degree else 180 / max(count - 1, 1))
     return Beams(count, np.deg2rad(-50 if per_degree == 4 else -90), step, None, is_sick=True)
 
@@ -302,11 +315,6 @@ def read_odometry(path):
         raise FormatError("no readable ODOM message in the file", path)
     forgive(path, bad, len(good) + len(bad))
     rows = np.array(list(good.values()))
-    keep = longest_rise(rows[:, 6])
-    lost = f"{len(rows) - len(keep)} of {len(rows)} ODOM messages"
-    if 2 * len(keep) < len(rows):
-        raise FormatError(f"the clock is useless: {lost} are out of order", path)
-    if len(keep) < len(rows):
-        warn_of(path, f"left out {lost}, which the clock puts out of order")
+    rows = rows[forgive_disorder(path, rows[:, 6], "ODOM")]
     rows[:, 2] = wrapped(rows[:, 2])
-    return Odometry(rows[keep, 6], rows[keep, :3], rows[keep, 3:5])
+    return Odometry(rows[:, 6], rows[:, :3], rows[:, 3:5])

@@ -1,30 +1,52 @@
-"""Laser scans from ROS 1 and ROS 2 bags, through rosbags (the extra `ros`)."""
+"""Laser scans, odometry and maps from ROS 1 and ROS 2 bags, through rosbags (the extra `ros`)."""
 
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from dollop.checks import need
-from dollop.formats.files import FormatError, from_file, warn_of
-from dollop.formats.scans import Beams, Scan, usable_scans
+from dollop.formats.files import FormatError, from_file
+from dollop.formats.odometry import Odometry
+from dollop.formats.ros_frames import Link, laser_poses, planar
+from dollop.formats.scans import Beams, Scan, doubtful, forgive_disorder, no_return_from, usable_scans
 from dollop.laser import LaserLog
 
-__all__ = ["read_log"]
+__all__ = ["SUFFIXES", "is_bag", "read_log", "read_map", "read_odometry"]
 
-SCAN_TYPE = "sensor_msgs/msg/LaserScan"
-MOVING = {"nav_msgs/msg/Odometry", "tf"}
-"""A type of messages and a topic that tell of a robot's motion."""
+SUFFIXES = (".bag", ".mcap", ".db3")
+SCAN, ODOMETRY, GRID = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "nav_msgs/msg/OccupancyGrid"
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+USUAL = {SCAN: None, ODOMETRY: "odom", GRID: "map"}
+"""Which topic of a type is meant if there are several and none is named."""
+
+
+def is_bag(path):
+    """Whether a path is that of a bag, by its name.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or the folder of a ROS 2 bag.
+
+    Returns
+    -------
+    bool
+    """
+    path = Path(path)
+    return path.is_dir() or path.name.endswith(SUFFIXES)
 
 
 def read_log(path, topic=None):
     """Laser scans of one topic of a ROS bag.
 
-    The poses are all (0, 0, 0): a bag says where the laser is by a tree of transforms, of which
-    only a localisation can make a pose in the world, so the laser is taken to stand still at the
-    origin. If it moved, give the log the poses that your localisation found:
-    `dataclasses.replace(log, poses=poses)`. Ranges outside of the message's [range_min, range_max]
-    and NaN become `inf`, as REP 117 (https://www.ros.org/reps/rep-0117.html) has it that they are
-    no measurements. The time is that of the message's header.
+    The poses are the laser's in the frame `map`, where `/tf` leads there; else by odometry, from
+    `/tf` or from the messages of `/odom` and the fixed transform from the robot to its laser, at
+    each scan's time; else all (0, 0, 0), the laser standing still. What is not in the frame `map`
+    has a note. Ranges outside of the message's [range_min, range_max] and NaN become `inf`, as
+    REP 117 (https://www.ros.org/reps/rep-0117.html) has it that they are no measurements, and so do
+    readings that pile up (`dollop.formats.scans.no_return_from`). The time is that of the message's
+    header.
 
     Parameters
     ----------
@@ -36,7 +58,8 @@ def read_log(path, topic=None):
     Returns
     -------
     LaserLog
-        Beam 0 rightmost, whichever way the laser turns.
+        Beam 0 rightmost, whichever way the laser turns or hangs; notes on poses, sensor and clock
+        where there is something to say.
 
     Raises
     ------
@@ -49,44 +72,145 @@ def read_log(path, topic=None):
     Warns
     -----
     UserWarning
-        If broken scans were left out, if the clock is wrong (`dollop.formats.scans.usable_scans`),
-        or if the bag holds odometry or moving transforms (`/tf`), so that the robot may have moved.
+        If broken scans were left out, or a note puts the log in doubt: if the clock is wrong
+        (`dollop.formats.scans.usable_scans`), or the poses are guesses.
     """
+    with _opened(path) as bag:
+        messages = list(_messages(path, bag, SCAN, topic))
+        scans = dict(enumerate(map(_scan, messages), 1))
+        links, odometry = _links(bag), _driven(bag)
+    if not scans:
+        raise FormatError("the topic holds no scan", path)
+    frame = messages[0].header.frame_id.strip("/")
+    scans, t, notes = usable_scans(path, scans, {})
+    beams, ranges = scans[0].beams, np.array([scan.ranges for scan in scans])
+    if np.array_equal(t, [scan.t for scan in scans]):
+        poses, hangs, further = laser_poses(path, links, odometry, frame, t)
+    else:
+        text = "without a clock the scans have no place in the odometry: every pose is (0, 0, 0)"
+        poses, hangs, further = np.zeros((len(t), 3)), False, (doubtful(path, "poses", text),)
+    angles = -beams.angles if hangs else beams.angles
+    order = slice(None, None, 1 if angles[-1] >= angles[0] else -1)
+    ranges, angles, notes = ranges[:, order], angles[order], notes + further
+    limit, further = no_return_from(path, ranges, angles, np.inf)
+    ranges, limit = np.where(ranges < limit, ranges, np.inf), min(limit, beams.max_range)
+    return from_file(path, LaserLog, t, ranges, angles, poses, limit, notes + further)
+
+
+def read_odometry(path, topic=None):
+    """Odometry of a robot, from one topic of a ROS bag (nav_msgs/Odometry).
+
+    Parameters
+    ----------
+    path : str or Path
+        The bag.
+    topic : str, optional
+        Which Odometry topic; by default `/odom`, or the only one.
+
+    Returns
+    -------
+    Odometry
+        Of the messages in order; the time is that of their headers.
+
+    Raises
+    ------
+    ImportError
+        If rosbags is not installed.
+    FormatError
+        If the file is no bag, holds no such topic or several to choose from, no message, or the
+        clock is in order for less than half of them.
+
+    Warns
+    -----
+    UserWarning
+        If messages were left out.
+    """
+    with _opened(path) as bag:
+        rows = [_odometry(message) for message in _messages(path, bag, ODOMETRY, topic)]
+    if not rows:
+        raise FormatError("the topic holds no odometry", path)
+    rows = np.array(rows)
+    rows = rows[forgive_disorder(path, rows[:, 0], "Odometry")]
+    return Odometry(rows[:, 0], rows[:, 1:4], rows[:, 5:7])
+
+
+def read_map(path, topic=None):
+    """Map of a ROS bag (nav_msgs/OccupancyGrid), the last one if it was sent several times.
+
+    Parameters
+    ----------
+    path : str or Path
+        The bag.
+    topic : str, optional
+        Which OccupancyGrid topic; by default `/map`, or the only one.
+
+    Returns
+    -------
+    occupancy : (H, W) float array
+        Probabilities, NaN where unknown; row 0 has the lowest y.
+    origin : (float, float)
+        Lower left corner, x, y in m.
+    resolution : float
+        Side of a cell in m.
+
+    Raises
+    ------
+    ImportError
+        If rosbags is not installed.
+    FormatError
+        If the file is no bag, holds no such topic or several to choose from, no message, or a map
+        that is turned.
+    """
+    with _opened(path) as bag:
+        grids = list(_messages(path, bag, GRID, topic))
+    if not grids:
+        raise FormatError("the topic holds no map", path)
+    frame = grids[-1].info
+    percent = np.array(grids[-1].data, float).reshape(frame.height, frame.width)
+    x, y, turn, _ = planar(frame.origin.position, frame.origin.orientation)
+    if abs(turn) > 1e-6:
+        raise FormatError(f"a turned map is not supported, got {turn:g} rad", path)
+    return np.where(percent < 0, np.nan, percent / 100), (x, y), float(frame.resolution)
+
+
+@contextmanager
+def _opened(path):
+    """The bag, open; whatever rosbags' parsers happen to raise is the file's fault."""
     need("ros")
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
     try:
         with AnyReader([Path(path)], default_typestore=get_typestore(Stores.LATEST)) as bag:
-            scans = _scans(path, bag, topic)
-            moving = {c.topic for c in bag.connections if MOVING & {c.msgtype, c.topic.strip("/")}}
+            yield bag
     except FormatError:
         raise
-    except Exception as error:  # whatever rosbags' parsers happen to raise
+    except Exception as error:
         raise FormatError(f"not a readable ROS bag ({error or type(error).__name__})", path) from None
-    if moving:
-        unread = f"{', '.join(sorted(moving))} of the bag is not read and every pose is (0, 0, 0)"
-        remedy = "if the robot moved, set the poses with dataclasses.replace(log, poses=poses)"
-        warn_of(path, f"{unread}; {remedy}")
-    if not scans:
-        raise FormatError("the topic holds no scan", path)
-    scans, t = usable_scans(path, dict(enumerate(scans, 1)), {})
-    beams, ranges = scans[0].beams, np.array([scan.ranges for scan in scans])
-    order = slice(None, None, 1 if beams.step > 0 else -1)
-    ranges, angles, poses = ranges[:, order], beams.angles[order], [scan.pose for scan in scans]
-    return from_file(path, LaserLog, t, ranges, angles, poses, beams.max_range)
 
 
-def _scans(path, bag, topic):
-    """All scans of the topic, or of the only one there is."""
-    connections = [c for c in bag.connections if c.msgtype == SCAN_TYPE]
-    topics = sorted({c.topic for c in connections})
-    if topic not in topics and (topic is not None or len(topics) != 1):
-        problem = "name one LaserScan topic" if topic is None else f"no LaserScan topic {topic!r}"
+def _messages(path, bag, kind, topic):
+    """Messages of the topic, or of the one that is meant."""
+    topics = sorted({c.topic for c in bag.connections if c.msgtype == kind})
+    chosen = _meant(topics, kind) if topic is None else topic
+    if chosen not in topics:
+        name = kind.rsplit("/", 1)[-1]
+        problem = f"name one {name} topic" if topic is None else f"no {name} topic {topic!r}"
         raise FormatError(f"{problem}; the bag has {', '.join(topics) or 'none'}", path)
-    connections = [c for c in connections if topic in (None, c.topic)]
-    messages = (bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages(connections))
-    return [_scan(message) for message in messages]
+    return _all_of(bag, lambda c: c.msgtype == kind and c.topic == chosen)
+
+
+def _meant(topics, kind):
+    """The only topic of a kind, or the one with the usual name; None if that is not clear."""
+    usual = [topic for topic in topics if topic.strip("/") == USUAL[kind]]
+    return topics[0] if len(topics) == 1 else next(iter(usual), None)
+
+
+def _all_of(bag, wanted):
+    """All messages of the connections that are wanted; rosbags takes none for all."""
+    connections = [c for c in bag.connections if wanted(c)]
+    raw = bag.messages(connections) if connections else ()
+    return (bag.deserialize(data, c.msgtype) for c, _, data in raw)
 
 
 def _scan(message):
@@ -94,5 +218,37 @@ def _scan(message):
     ranges = np.array(message.ranges, dtype=float)
     measured = (ranges >= message.range_min) & (ranges <= message.range_max)
     beams = Beams(ranges.size, message.angle_min, message.angle_increment, message.range_max)
-    t = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-    return Scan(beams, np.where(measured, ranges, np.inf), (0, 0, 0), t)
+    return Scan(beams, np.where(measured, ranges, np.inf), (0, 0, 0), _seconds(message.header.stamp))
+
+
+def _seconds(stamp):
+    return stamp.sec + 1e-9 * stamp.nanosec
+
+
+def _odometry(message):
+    """Time, x, y, theta, up, forward and turning speed of a message, in s, m and rad."""
+    pose, twist = message.pose.pose, message.twist.twist
+    place = planar(pose.position, pose.orientation)
+    return _seconds(message.header.stamp), *place, twist.linear.x, twist.angular.z
+
+
+def _links(bag):
+    """All transforms of the bag: each frame's link to its parent."""
+    found = {}
+    for message in _all_of(bag, lambda c: c.msgtype in TRANSFORMS):
+        for each in message.transforms:
+            names = each.child_frame_id.strip("/"), each.header.frame_id.strip("/")
+            place = planar(each.transform.translation, each.transform.rotation)
+            found.setdefault(names, []).append((_seconds(each.header.stamp), place))
+    return {child: Link.of(parent, *zip(*rows, strict=True)) for (child, parent), rows in found.items()}
+
+
+def _driven(bag):
+    """The robot's frame and its link to the odometry's by the messages of odometry, None without."""
+    topic = _meant(sorted({c.topic for c in bag.connections if c.msgtype == ODOMETRY}), ODOMETRY)
+    messages = list(_all_of(bag, lambda c: c.msgtype == ODOMETRY and c.topic == topic))
+    if not messages:
+        return None
+    rows = [_odometry(message) for message in messages]
+    names = messages[0].child_frame_id.strip("/"), messages[0].header.frame_id.strip("/")
+    return names[0], Link.of(names[1] or "odom", [row[0] for row in rows], [row[1:5] for row in rows])

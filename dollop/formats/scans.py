@@ -6,9 +6,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dollop.checks import Note
 from dollop.formats.files import FormatError, warn_of
 
-__all__ = ["Beams", "Scan", "forgive", "longest_rise", "usable_scans"]
+__all__ = [
+    "Beams",
+    "Scan",
+    "doubtful",
+    "forgive",
+    "forgive_disorder",
+    "longest_rise",
+    "no_return_from",
+    "usable_scans",
+]
 
 NOMINAL_RATE = 10.0
 """Scans per second of a SICK LMS 200 at 1 degree and 38400 baud: what a log without a usable clock
@@ -18,6 +28,15 @@ LONGEST_GAP = 3600.0
 """Seconds without a scan from which on it is the clock that jumped: no log of a demonstration rests
 for an hour.
 """
+PILE, BELOW = 0.10, 1.0
+"""m: how far the readings may vary with which a laser says that nothing came back, and how far below them
+there is next to nothing."""
+OFTEN, STANDING_OUT, ALIKE = 50, 20, 0.7
+"""How many readings are a pile, how many times those below it, and which share of it two values make up:
+readings of a wall vary with the laser's noise."""
+WIDE = np.radians(30)
+"""Bearings in rad that a pile must spread over: the end of a corridor may be read alike often, but it is
+narrow."""
 
 
 class Beams(NamedTuple):
@@ -97,6 +116,8 @@ def usable_scans(path, scans, bad):
         All of the same `beams`.
     t : (K,) float array
         Their times in s, strictly increasing.
+    notes : tuple of Note
+        Of kind "clock", if all times are in doubt.
 
     Raises
     ------
@@ -121,8 +142,90 @@ def usable_scans(path, scans, bad):
     odd = {place: f"{each}, where most scans have {beams}" for place, each in other.items()}
     forgive(path, bad | odd, len(scans) + len(bad))
     alike = [scan for scan in scans.values() if scan.beams == beams]
-    keep, t = _usable_clock(path, np.array([scan.t for scan in alike]))
-    return [alike[i] for i in keep], t
+    keep, t, notes = _usable_clock(path, np.array([scan.t for scan in alike]))
+    return [alike[i] for i in keep], t, notes
+
+
+def doubtful(path, kind, text):
+    """Warn of what puts a whole log in doubt, and note it.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    kind, text : str
+        As in `dollop.checks.Note`.
+
+    Returns
+    -------
+    Note
+        With doubt.
+    """
+    warn_of(path, text)
+    return Note(kind, text)
+
+
+def no_return_from(path, ranges, angles, limit):
+    """Smallest reading of a log that is no distance, as far as its readings tell.
+
+    A laser that says "nothing came back" by a number says it often, from all around, and always by
+    the same number or a few, with next to nothing in the metre below. Readings of a wall vary with
+    noise, and more below it than they do. What is so alike but comes from one narrow direction may
+    be the end of a corridor: it stays a distance, in doubt. The limits are a reconstruction.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, for the warning.
+    ranges : (T, B) float array
+        In m.
+    angles : (B,) float array
+        Bearings in rad.
+    limit : float
+        Reading in m from which on it is known that nothing came back.
+
+    Returns
+    -------
+    limit : float
+        In m, no larger than the one known.
+    notes : tuple of Note
+        Of kind "sensor", if there is such a pile.
+
+    Examples
+    --------
+    >>> ranges = np.tile(np.linspace(1.0, 9.0, 100), (100, 1))
+    >>> ranges[:, ::10] = 50.0
+    >>> limit, notes = no_return_from("a.log", ranges, np.linspace(-1.5, 1.5, 100), 80.0)
+    >>> limit, notes[0].text
+    (50.0, '10.0% of the readings pile up at 50 m: taken to mean that nothing came back')
+    """
+    piled, wide = _pile(ranges, angles, limit)
+    if not piled.size:
+        return limit, ()
+    low, high = float(piled.min()), float(piled.max())
+    place = f"{low:g} m" if low == high else f"{low:g} to {high:g} m"
+    text = f"{piled.size / ranges.size:.1%} of the readings pile up at {place}"
+    if wide:
+        note = Note("sensor", f"{text}: taken to mean that nothing came back", doubt=False)
+        lower, further = no_return_from(path, ranges, angles, low)
+        return lower, (note, *further)
+    remedy = f"dataclasses.replace(log, ranges=np.where(log.ranges < {low:g}, log.ranges, np.inf))"
+    return limit, (doubtful(path, "sensor", f"{text}; if that means that nothing came back: {remedy}"),)
+
+
+def _pile(ranges, angles, limit):
+    """Largest readings below a limit if they stand out, (N,), and whether they come from all around."""
+    below = np.where(ranges < limit - 1e-9, ranges, 0.0)
+    top = below.max()
+    pile = below >= top - PILE
+    piled = below[pile]
+    beneath = (below >= top - PILE - BELOW).sum() - piled.size
+    rest = (below > 0).sum() - piled.size
+    alike = sum(count for _, count in Counter(piled.tolist()).most_common(2))
+    often = piled.size >= OFTEN and piled.size >= STANDING_OUT * beneath and rest >= OFTEN
+    if not often or alike < ALIKE * piled.size:
+        return np.empty(0), False
+    return piled, np.ptp(angles[pile.any(axis=0)]) >= WIDE
 
 
 def forgive(path, bad, total):
@@ -166,6 +269,42 @@ def forgive(path, bad, total):
     warn_of(path, f"{lost}: {bad[line]}")
 
 
+def forgive_disorder(path, t, name):
+    """Which messages are in order; the others are accepted with a warning, or the file is refused.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, for the message.
+    t : (N,) float array
+        Times of the messages in s.
+    name : str
+        What they are called.
+
+    Returns
+    -------
+    (K,) int array
+        Indices of the messages that stay.
+
+    Raises
+    ------
+    FormatError
+        If the clock is in order for less than half of them.
+
+    Warns
+    -----
+    UserWarning
+        With their number, if some are left out.
+    """
+    keep = longest_rise(t)
+    lost = f"{len(t) - len(keep)} of {len(t)} {name} messages"
+    if 2 * len(keep) < len(t):
+        raise FormatError(f"the clock is useless: {lost} are out of order", path)
+    if len(keep) < len(t):
+        warn_of(path, f"left out {lost}, which the clock puts out of order")
+    return keep
+
+
 def longest_rise(values):
     """Indices of a longest strictly increasing subsequence.
 
@@ -200,7 +339,7 @@ def longest_rise(values):
 
 
 def _usable_clock(path, t):
-    """Which of the scans at times `t` (T,) stay, (K,), and their times (K,): see `usable_scans`."""
+    """Which of the scans at times `t` (T,) stay, (K,), their times (K,), and notes: see `usable_scans`."""
     keep = longest_rise(t)
     far = np.diff(t[keep], prepend=-np.inf, append=np.inf) > LONGEST_GAP
     stray = far[:-1] & far[1:]  # from both neighbours; the first and the last have but one
@@ -209,11 +348,15 @@ def _usable_clock(path, t):
     if lost * 20 > len(t):
         out = f"{lost} of {len(t)} scans are out of order"
         consequence = f"so the scans are timed at {NOMINAL_RATE:g} Hz; speeds mean nothing"
-        warn_of(path, f"the clock stands still or runs backwards ({out}), {consequence}")
-        return np.arange(len(t)), np.arange(len(t)) / NOMINAL_RATE
+        text = f"the clock stands still or runs backwards ({out}), {consequence}"
+        return np.arange(len(t)), np.arange(len(t)) / NOMINAL_RATE, (doubtful(path, "clock", text),)
     if lost:
         warn_of(path, f"left out {lost} of {len(t)} scans, which the clock puts out of order")
     gap = np.diff(t[keep]).max(initial=0)
-    if gap > LONGEST_GAP:
-        warn_of(path, f"the clock jumps by {gap:g} s from one scan to the next")
-    return keep, t[keep]
+    if gap <= LONGEST_GAP:
+        return keep, t[keep], ()
+    return (
+        keep,
+        t[keep],
+        (doubtful(path, "clock", f"the clock jumps by {gap:g} s from one scan to the next"),),
+    )

@@ -17,6 +17,7 @@ half of it, so a pose that was searched for is believed only when it has explain
 half a turn.
 """
 
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -27,7 +28,10 @@ from dollop.gridmap import covered_cells, in_cells
 from dollop.pose import rotation
 from dollop.robot.avoidance import FREE_BELOW
 
-__all__ = ["MonteCarloLocalizer"]
+__all__ = [
+    "BEAM_STEP", "DOUBTS", "FLOOR", "INDEPENDENT", "LOST", "SIGMA", "USUAL_FIT", "WIDE_SIGMA", "MonteCarloLocalizer",
+    "surface_cells",
+]  # fmt: skip
 
 SIGMA, WIDE_SIGMA = 0.10, 0.20
 """Standard deviations in m of the likelihood field: for particles, and for a lattice, which misses
@@ -102,17 +106,20 @@ class MonteCarloLocalizer:
         free = (background.occupancy < FREE_BELOW) & ~blocked
         if not free.any():
             raise ValueError("the background must have a free cell to search, got none")
-        surface = blocked & ~scipy.ndimage.binary_erosion(blocked, border_value=1)  # where they end
-        away = scipy.ndimage.distance_transform_edt(~surface, sampling=background.resolution)
-        self._field = LikelihoodField(away, SIGMA, *frame)
-        self._wide_field = LikelihoodField(away, WIDE_SIGMA, *frame)
-        self._lattice = lattice(free, background)
+        surface, self._frame = surface_cells(blocked), frame
+        self._away = scipy.ndimage.distance_transform_edt(~surface, sampling=background.resolution)
+        self._field, self._lattice = LikelihoodField(self._away, SIGMA, *frame), lattice(free, background)
         self._usual_fit = USUAL_FIT
         self.pose, self.spread, self.fit = np.full(3, np.nan), np.full(2, np.inf), 0.0
         if pose is None:
             self.search()
         else:
             self.start(pose)
+
+    @cached_property
+    def _wide_field(self):
+        """For the lattice, which a robot that knows where it is does not need."""
+        return LikelihoodField(self._away, WIDE_SIGMA, *self._frame)
 
     @property
     def localised(self):
@@ -187,16 +194,43 @@ class MonteCarloLocalizer:
         directions = np.column_stack([np.cos(self._bearings[back]), np.sin(self._bearings[back])])
         return ranges[back, None] * directions + [self._laser_offset, 0.0]
 
+    def lattice_scores(self, ends):
+        """Log likelihood of every pose of the lattice, by the wide field.
+
+        Parameters
+        ----------
+        ends : (M, 2) float array
+            Beam ends in the robot's frame in m.
+
+        Returns
+        -------
+        (N,) float array
+        """
+        score, headings = self._wide_field.lattice_log_likelihoods, np.arange(HEADINGS) * (2 * pi / HEADINGS)
+        return np.concatenate([score(self._lattice, heading, ends) for heading in headings])
+
+    def lattice_poses(self, chosen):
+        """Poses of the lattice.
+
+        Parameters
+        ----------
+        chosen : (N,) int array
+            Which, in the order of `lattice_scores`.
+
+        Returns
+        -------
+        (N, 3) float array
+            x, y in m, theta in rad.
+        """
+        heading, place = np.divmod(chosen, len(self._lattice))
+        return np.column_stack([self._lattice[place], heading * (2 * pi / HEADINGS)])
+
     def _draw(self, ends):
         """Particles (N, 3) from a scan: lattice poses by their likelihood, spread over meshes."""
-        headings = np.arange(HEADINGS) * (2 * pi / HEADINGS)
-        score, few = self._wide_field.lattice_log_likelihoods, ends[::2]
-        scores = np.concatenate([score(self._lattice, heading, few) for heading in headings])
+        scores = self.lattice_scores(ends[::2])
         chosen = self._rng.choice(len(scores), SEARCHING, p=softmax(2 * INDEPENDENT * scores))
-        heading, place = np.divmod(chosen, len(self._lattice))
         mesh = [LATTICE, LATTICE, 2 * pi / HEADINGS]
-        meshes = self._rng.uniform(-0.5, 0.5, (SEARCHING, 3)) * mesh
-        return np.column_stack([self._lattice[place], headings[heading]]) + meshes
+        return self.lattice_poses(chosen) + self._rng.uniform(-0.5, 0.5, (SEARCHING, 3)) * mesh
 
     def _resampled(self, weights):
         """Particles (N, 3) drawn with the weights by one comb, few if they agree."""
@@ -258,6 +292,21 @@ class LikelihoodField:
     def within_reach(self, ends):
         """Beam ends (M, 2), those that are farther than the map is wide drawn in."""
         return ends * np.minimum(1.0, self.reach / np.maximum(np.hypot(*ends.T), 1e-9))[:, None]
+
+
+def surface_cells(blocked):
+    """Blocked cells at which beams may end.
+
+    Parameters
+    ----------
+    blocked : (H, W) bool array
+
+    Returns
+    -------
+    (H, W) bool array
+        Without those inside of something.
+    """
+    return blocked & ~scipy.ndimage.binary_erosion(blocked, border_value=1)
 
 
 def lattice(free, background):

@@ -24,6 +24,11 @@ def flaser(ranges, pose=(1, 2, 0.5), t=0.0):
     return f"FLASER {len(ranges)} {numbers} {t} host {t}"
 
 
+def read_log(path, **options):
+    """Read a log of FLASER lines with few beams, which spread over half a turn."""
+    return carmen_log.read_log(path, fov=np.pi, **options)
+
+
 def flasers(count, ranges=(1.0, 2.0, 3.0)):
     """`count` good FLASER lines, a tenth of a second apart."""
     return [flaser(ranges, t=i / 10) for i in range(count)]
@@ -106,26 +111,85 @@ def test_error_codes_are_no_returns(tmp_path, code, max_range):
 
     So does a reading of zero.
     """
-    log = carmen_log.read_log(write(tmp_path / "a.log", [flaser([1.0, code, 2.0, 0.0])]))
+    log = read_log(write(tmp_path / "a.log", [flaser([1.0, code, 2.0, 0.0])]))
     assert log.ranges.tolist() == [[1.0, np.inf, 2.0, np.inf]]
     assert log.max_range == max_range
 
 
 def test_a_code_of_millimetres_is_a_distance_among_centimetres(tmp_path):
     """8.19 m is a distance in a log whose readings go up to 81.91 m."""
-    log = carmen_log.read_log(write(tmp_path / "a.log", [flaser([8.19, 81.91])]))
+    log = read_log(write(tmp_path / "a.log", [flaser([8.19, 81.91])]))
     assert log.ranges.tolist() == [[8.19, np.inf]]
 
 
 def test_unknown_full_scale_is_suspected(tmp_path):
-    """Many readings exactly at the largest one give a warning.
+    """Many readings exactly at the largest one, always in the same beam, give a warning and a note.
 
-    It says how to read them as no return.
+    They say how to read them as no return.
     """
     path = write(tmp_path / "a.log", [flaser([1.0, 2.0, 30.0, 4.0], t=i) for i in range(300)])
-    with pytest.warns(UserWarning, match="25% of the readings are exactly 30.0 m"):
-        carmen_log.read_log(path)
-    assert np.isinf(carmen_log.read_log(path, max_range=30.0).ranges[:, 2]).all()
+    with pytest.warns(UserWarning, match="25.0% of the readings pile up at 30 m"):
+        log = read_log(path)
+    assert [(note.kind, note.doubt) for note in log.notes] == [("sensor", True)]
+    assert (log.ranges[:, 2] == 30.0).all()
+    log = read_log(path, max_range=30.0)
+    assert np.isinf(log.ranges[:, 2]).all() and not log.notes
+
+
+def test_unknown_full_scale_is_found(tmp_path, recwarn):
+    """Many readings exactly at the largest one, from everywhere, are no return; a note says so."""
+    ranges = np.random.default_rng(0).uniform(1.0, 4.0, (300, 4)).round(3)
+    ranges[np.arange(300), np.arange(300) % 4] = 50.0
+    rows = [flaser(row, t=i) for i, row in enumerate(ranges)]
+    log = read_log(write(tmp_path / "a.log", rows))
+    assert np.isinf(log.ranges).sum() == 300 and log.max_range == 50.0
+    assert [(note.kind, note.doubt) for note in log.notes] == [("sensor", False)]
+    assert not len(recwarn)
+
+
+def test_a_guessed_field_of_view_is_told(tmp_path):
+    """A number of beams that CARMEN does not know is a guess; told the angle, nothing is guessed."""
+    path = write(tmp_path / "a.log", [flaser(np.linspace(1, 5, 271), t=i / 10) for i in range(30)])
+    text = "271 beams are taken to spread over 180 degrees, which the file does not state; .*fov="
+    with pytest.warns(UserWarning, match=text):
+        log = carmen_log.read_log(path)
+    assert [(note.kind, note.doubt) for note in log.notes] == [("sensor", True)] and "fov=" in log.notes[0].text
+    log = carmen_log.read_log(path, fov=np.radians(270))
+    assert not log.notes
+    np.testing.assert_allclose(np.degrees(log.angles), np.arange(-135, 136))
+
+
+def test_one_beam_looks_ahead_whatever_the_field_of_view(tmp_path):
+    """The middle of the field is where a single beam is."""
+    log = carmen_log.read_log(write(tmp_path / "a.log", [flaser([1.0])]), fov=1.0)
+    assert log.angles.tolist() == [0.0]
+
+
+@pytest.mark.parametrize(("count", "doubt"), [(180, False), (181, False), (360, True), (361, True)])
+def test_a_known_number_of_beams_is_doubted_where_its_ends_meet(tmp_path, count, doubt):
+    """360 beams half a degree apart, or one: those of a full turn see the same with the last as with the first."""
+    turn = np.arange(count) * 2 * np.pi / count
+    for ranges, told in ((3 + np.sin(turn), doubt), (3 + np.sin(turn / 2 + np.pi / 4), False)):
+        path = write(tmp_path / "a.log", [flaser(ranges.round(3), t=i / 10) for i in range(30)])
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            notes = carmen_log.read_log(path).notes
+        assert [note.doubt for note in notes] == [True] * told and len(caught) == told
+        assert all("the first and the last see the same" in note.text for note in notes)
+
+
+@pytest.mark.parametrize("fov", [0.0, -1.0, 7.0, np.nan, np.inf, "180"])
+def test_fov_out_of_range_is_named(tmp_path, fov):
+    """The error names the value and the rule."""
+    with pytest.raises(ValueError, match="fov must be .*got"):
+        carmen_log.read_log(write(tmp_path / "a.log", flasers(3)), fov=fov)
+
+
+def test_fov_of_a_message_that_states_it_is_refused(tmp_path):
+    """A ROBOTLASER1 message says where its beams are: to say it again is an error."""
+    carmen_log.write_log(tmp_path / "a.log", random_log())
+    with pytest.raises(ValueError, match=r"a\.log: ROBOTLASER1 messages state their field of view, got fov=3"):
+        carmen_log.read_log(tmp_path / "a.log", fov=3.0)
 
 
 def test_robotlaser_is_preferred(tmp_path):
@@ -200,7 +264,7 @@ def test_one_bad_line_in_a_long_log(tmp_path, message):
     path = write(tmp_path / "a.log", lines)
     text = f"left out 1 broken of 51 scans, the first on line 11: .*{message}"
     with pytest.warns(UserWarning, match=text) as record:
-        log = carmen_log.read_log(path)
+        log = read_log(path)
     assert len(log) == 50 and len(record) == 1
 
 
@@ -210,20 +274,20 @@ def test_one_bad_line_in_a_short_log(tmp_path, message):
     lines = flasers(3)
     lines.insert(1, BAD_LINES[message])
     with pytest.raises(FormatError, match=r"a\.log, line 2: "):
-        carmen_log.read_log(write(tmp_path / "a.log", lines))
+        read_log(write(tmp_path / "a.log", lines))
 
 
 def test_a_byte_order_mark_costs_no_scan(tmp_path):
     """The first message counts also where an editor put a mark before it."""
     (tmp_path / "a.log").write_text("\n".join(flasers(30)), encoding="utf-8-sig")
-    assert len(carmen_log.read_log(tmp_path / "a.log")) == 30
+    assert len(read_log(tmp_path / "a.log")) == 30
 
 
 @pytest.mark.parametrize("max_range", [0, -1.0, np.nan, np.inf])
 def test_max_range_out_of_range_is_named(tmp_path, max_range):
     """The error names the value and the rule."""
     with pytest.raises(ValueError, match=f"max_range must be positive and finite, got {max_range}"):
-        carmen_log.read_log(write(tmp_path / "a.log", flasers(3)), max_range=max_range)
+        read_log(write(tmp_path / "a.log", flasers(3)), max_range=max_range)
 
 
 def test_cut_off_log_loses_its_last_line(tmp_path):
@@ -231,7 +295,7 @@ def test_cut_off_log_loses_its_last_line(tmp_path):
     text = "\n".join(flasers(50))
     (tmp_path / "a.log").write_text(text[:-25])
     with pytest.warns(UserWarning, match="left out 1 broken of 50 scans, the first on line 50"):
-        assert len(carmen_log.read_log(tmp_path / "a.log")) == 49
+        assert len(read_log(tmp_path / "a.log")) == 49
 
 
 def test_cut_off_time_is_not_taken_for_a_time(tmp_path):
@@ -242,7 +306,7 @@ def test_cut_off_time_is_not_taken_for_a_time(tmp_path):
     lines = flasers(50)
     lines[-1] = lines[-1][: lines[-1].index(" host")]
     with pytest.warns(UserWarning, match="left out 1 broken of 50"):
-        assert carmen_log.read_log(write(tmp_path / "a.log", lines)).t[-1] == 4.8
+        assert read_log(write(tmp_path / "a.log", lines)).t[-1] == 4.8
 
 
 @pytest.mark.parametrize(
@@ -261,14 +325,14 @@ def test_what_is_no_log(tmp_path, content, message):
     """Empty, binary, truncated and other files give a FormatError that says what is wrong."""
     (tmp_path / "a.log").write_bytes(content)
     with pytest.raises(FormatError, match=message):
-        carmen_log.read_log(tmp_path / "a.log")
+        read_log(tmp_path / "a.log")
 
 
 def test_standing_clock_is_replaced_with_a_warning(tmp_path):
     """A log whose clock is all zero keeps its scans, at the nominal rate, and says so."""
     path = write(tmp_path / "a.log", [flaser((1.0, 2.0), t=0) for _ in range(30)])
     with pytest.warns(UserWarning, match="stands still or runs backwards .29 of 30.*10 Hz"):
-        log = carmen_log.read_log(path)
+        log = read_log(path)
     np.testing.assert_allclose(log.t, np.arange(30) / 10)
 
 
@@ -280,7 +344,7 @@ def test_a_step_back_in_time_is_left_out(tmp_path):
     lines = flasers(50)
     lines[20] = flaser((1.0, 2.0, 3.0), pose=(5, 5, 5), t=1.0)
     with pytest.warns(UserWarning, match="left out 1 of 50 scans, which the clock puts out"):
-        log = carmen_log.read_log(write(tmp_path / "a.log", lines))
+        log = read_log(write(tmp_path / "a.log", lines))
     assert len(log) == 49 and 5 not in log.poses
 
 

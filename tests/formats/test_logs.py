@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dollop.formats.files import FormatError
-from dollop.formats.logs import read_log, write_log
+from dollop.formats.logs import read_log, read_odometry, write_log
 from dollop.laser import LaserLog
 
 LOG = LaserLog([0.0, 0.1], [[1.0, np.inf], [2.0, 3.0]], [-0.5, 0.5], [[0, 0, 0], [1, 0, 0]], 8.191)
@@ -40,8 +40,21 @@ def test_other_suffixes_are_refused(tmp_path):
 def test_missing_file(tmp_path):
     """A file that is not there is named."""
     for name in ("a.log", "a.bag", "a"):
-        with pytest.raises(FileNotFoundError, match=name):
-            read_log(tmp_path / name)
+        for read in (read_log, read_odometry):
+            with pytest.raises(FileNotFoundError, match=name):
+                read(tmp_path / name)
+
+
+def test_odometry_by_suffix(tmp_path):
+    """Of a CARMEN log it is the ODOM messages, and there is no topic to name."""
+    lines = [f"ODOM {i} 0 0 0.5 0 0 {i} host 0" for i in range(30)]
+    (tmp_path / "a.log").write_text("\n".join(lines))
+    assert len(read_odometry(tmp_path / "a.log")) == 30
+    with pytest.raises(ValueError, match="no topics, got topic='/odom'"):
+        read_odometry(tmp_path / "a.log", topic="/odom")
+    (tmp_path / "a.txt").write_text("x")
+    with pytest.raises(FormatError, match="a CARMEN log is named"):
+        read_odometry(tmp_path / "a.txt")
 
 
 def test_carmen_logs_have_no_topics(tmp_path):
@@ -49,6 +62,17 @@ def test_carmen_logs_have_no_topics(tmp_path):
     write_log(tmp_path / "a.log", LOG)
     with pytest.raises(ValueError, match="no topics, got topic='/scan'"):
         read_log(tmp_path / "a.log", topic="/scan")
+
+
+def test_the_field_of_view_is_told_where_it_is_not_stated(tmp_path):
+    """Of FLASER lines it is taken; what a file states itself is not said again."""
+    (tmp_path / "a.log").write_text("FLASER 3 1 2 3 0 0 0 0 0 0 5 host 5\n")
+    np.testing.assert_allclose(read_log(tmp_path / "a.log", fov=2.0).angles, [-1, 0, 1])
+    write_log(tmp_path / "b.log", LOG)
+    (tmp_path / "c.bag").write_bytes(b"#ROSBAG V2.0\n")
+    for name in ("b.log", "c.bag"):
+        with pytest.raises(ValueError, match=rf"{name[0]}\.{name[2:]}: .* field of view, got fov=2"):
+            read_log(tmp_path / name, fov=2.0)
 
 
 def test_bags_without_rosbags_say_what_to_install(tmp_path, monkeypatch):
@@ -61,21 +85,23 @@ def test_bags_without_rosbags_say_what_to_install(tmp_path, monkeypatch):
 
 @pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="no recordings")
 @pytest.mark.parametrize(
-    ("name", "shape", "max_range", "warning"),
+    ("name", "shape", "max_range", "warning", "kinds"),
     [
-        ("carmen_logs/intel-corrected.log.gz", (906, 180), 80.0, "left out 4 of 910"),
-        ("carmen_logs/edmonton-corrected.log.gz", (340, 180), 51.14, None),
-        ("carmen_logs/csail-corrected.log.gz", (406, 361), 80.0, "404 of 406 scans are out"),
-        ("carmen_logs/orebro-corrected.log.gz", (237, 181), 32.759, "236 of 237 scans are out"),
-        ("people/demo_stationary_simple_environment.bag", (1265, 512), 5.6, None),
-        ("people/walker_1.bag", (400, 768), 11.0, None),
+        ("carmen_logs/intel-corrected.log.gz", (906, 180), 80.0, "left out 4 of 910", []),
+        ("carmen_logs/edmonton-corrected.log.gz", (340, 180), 51.09, None, ["sensor"]),
+        ("carmen_logs/csail-corrected.log.gz", (406, 361), 80.0, "404 of 406 scans are out", ["clock"]),
+        ("carmen_logs/orebro-corrected.log.gz", (237, 181), 32.759, "236 of 237 scans are out", ["clock"]),
+        ("people/demo_stationary_simple_environment.bag", (1265, 512), 5.6, None, ["poses"]),
+        ("people/walker_1.bag", (400, 768), 11.0, None, ["poses"]),
     ],
 )
-def test_real_logs(name, shape, max_range, warning, recwarn):
-    """Every real recording is read whole, its no-returns found, and a bad clock is warned of."""
+def test_real_logs(name, shape, max_range, warning, kinds, recwarn):
+    """Every real recording is read whole, its no-returns found, and a bad clock is warned of and noted."""
     log = read_log(Path(os.environ["DOLLOP_EXTERNAL_DATA"]) / name)
     assert log.ranges.shape == shape
     assert log.max_range == pytest.approx(max_range, rel=1e-6)
+    assert [note.kind for note in log.notes] == kinds
+    assert [note.doubt for note in log.notes] == [kind == "clock" for kind in kinds]
     assert 0.01 < np.isinf(log.ranges).mean() < 0.7
     assert all(warning.filename == __file__ for warning in recwarn)
     messages = [str(w.message) for w in recwarn]

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from places import DATA
 from scipy.spatial import cKDTree
 
 pytest.importorskip("pybullet", reason="the laboratory needs PyBullet (extra `lab`)")
 
+from dollop import OccupancyGrid, localise
 from dollop.lab.driving import ARRIVED
 from dollop.lab.engine import Engine, Solid
 from dollop.lab.outlines import outline_distances
@@ -21,6 +23,7 @@ from dollop.lab.scenes import Scene, empty_scene, figure_eight_scene
 from dollop.lab.simulate import record, record_background, record_figure_eights, record_tour, watch
 from dollop.lab.things import Move, Object, Person, Robot
 from dollop.lab.world import World
+from dollop.pose import between, composed
 
 CLEAN = SickLMS200(noise=0.0, mixed=0.0)
 
@@ -245,6 +248,18 @@ def test_a_recording_survives_saving(busy, tmp_path):
     assert np.allclose(back.log.poses, busy.log.poses, atol=1e-4)
     pd.testing.assert_frame_equal(back.truth, busy.truth, atol=1e-4, rtol=0)
     assert back.scene.to_dict() == busy.scene.to_dict()
+
+
+def test_a_log_by_odometry_is_localised(busy):
+    """Among people and things that the map does not have, drifting poses are put right to 5 cm and 2 degrees."""
+    background = OccupancyGrid.load(DATA / "lab.yaml")
+    truth = busy.truth[["laser_x", "laser_y", "laser_theta"]].to_numpy()
+    for start in (np.zeros(3), np.array([30.0, 5.0, 2.0])):  # told, and searched for
+        log = replace(busy.log, poses=composed(start, busy.log.poses))
+        found = localise(log, None, background)
+        apart = between(truth, found.poses)
+        assert np.hypot(*apart[:, :2].T).mean() < 0.05 and np.degrees(np.abs(apart[:, 2])).mean() < 2
+        assert not found.notes
 
 
 def test_odometry_drifts_from_the_truth(busy):
