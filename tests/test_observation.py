@@ -334,6 +334,14 @@ def test_what_moved_came_or_went_is_noted_with_when(kind, there):
     np.testing.assert_allclose(found, after, atol=0.06)
 
 
+def test_an_object_that_goes_on_behind_another_is_noted():
+    """It may be larger than what is seen of it: that is said of this one alone, and puts nothing in doubt."""
+    observation = observe(watched(nobody(3.0), [[4.3, 2.0, 4.7, 2.4], [4.5, 4.0, 5.5, 4.5]]), room_map())
+    (note,) = observation.notes
+    assert note.kind == "in part" and "object at (5.25, 4.2" in note.text and observation.trusted
+    assert len(observation.environment) == 2
+
+
 @pytest.mark.parametrize("boxes", [[], CANS], ids=["empty", "cans"])
 @pytest.mark.parametrize("seed", range(3))
 def test_nobody_is_nobody(boxes, seed):
@@ -544,10 +552,11 @@ def test_strangers_walks_are_found_whole(strangers_map, name, mean):
 @external
 @pytest.mark.parametrize(("name", "boxes"), [("same", BOXES), ("moved", LATER)])
 def test_strangers_boxes_are_found_in_three_seconds(strangers_map, name, boxes):
-    """Both of them, every side within 0.1 m, and nobody."""
+    """Both of them, every side within 0.1 m, and nobody; that one is partly behind the other is noted, no more."""
     observation = observe(read_log(strangers(f"{name}.log.gz")), strangers_map)
     np.testing.assert_allclose(sorted(observation.environment.boxes.tolist()), boxes, atol=0.1)
-    assert observation.people == () and observation.notes == ()
+    assert observation.people == () and observation.trusted
+    assert {note.kind for note in observation.notes} <= {"in part"}
 
 
 @pytest.fixture(scope="module")

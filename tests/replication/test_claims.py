@@ -9,8 +9,9 @@ from places import ROOT
 from scipy.stats import binom
 from scipy.stats import t as student
 
-from dollop.replication import study
-from dollop.replication.claims import CLAIMS
+import dollop
+from dollop.replication import recordings, study
+from dollop.replication.claims import CLAIMS, environment, observing
 
 GOLDEN = json.loads((ROOT / "study" / "golden.json").read_text())
 PUBLISHED = {claim["id"]: claim for claim in json.loads((ROOT / "claims.json").read_text())}
@@ -65,6 +66,24 @@ def test_rerunnable(fresh):
         assert failures == []
         assert [(row[0], row[2]) for row in rows] == [(c.id, each.number) for c, each in NUMBERS]
         assert {row[1] for row in rows} == {seed}
+
+
+@pytest.mark.parametrize("of_paper", [True, False], ids=["Sec. II", "later"])
+def test_what_the_paper_says_of_observing_is_measured_on_its_own_method(of_paper, monkeypatch):
+    """Claims of Sec. II observe with method="paper" alone, those of all other sections never do."""
+    asked = set()
+
+    def observe(*arguments, **options):
+        asked.add(options.get("method", "people"))
+        return dollop.observe(*arguments, **options)
+
+    forget()
+    for module in (recordings, observing, environment):
+        monkeypatch.setattr(module, "observe", observe)
+    ids = [claim.id for claim in CLAIMS.values() if (claim.section == "II") == of_paper]
+    assert study.work(0, ids)[2] == [] and len(ids) > 6
+    assert asked == {"paper" if of_paper else "people"}
+    forget()
 
 
 def test_repeatable(fresh):
