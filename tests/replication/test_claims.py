@@ -68,24 +68,6 @@ def test_rerunnable(fresh):
         assert {row[1] for row in rows} == {seed}
 
 
-@pytest.mark.parametrize("of_paper", [True, False], ids=["Sec. II", "later"])
-def test_what_the_paper_says_of_observing_is_measured_on_its_own_method(of_paper, monkeypatch):
-    """Claims of Sec. II observe with method="paper" alone, those of all other sections never do."""
-    asked = set()
-
-    def observe(*arguments, **options):
-        asked.add(options.get("method", "people"))
-        return dollop.observe(*arguments, **options)
-
-    forget()
-    for module in (recordings, observing, environment):
-        monkeypatch.setattr(module, "observe", observe)
-    ids = [claim.id for claim in CLAIMS.values() if (claim.section == "II") == of_paper]
-    assert study.work(0, ids)[2] == [] and len(ids) > 6
-    assert asked == {"paper" if of_paper else "people"}
-    forget()
-
-
 def test_repeatable(fresh):
     """The same seed twice, everything made anew, gives the same numbers to the last digit."""
     assert forget() >= 8  # recordings, observations, laps, task, slaloms, runs, looks, background
@@ -171,3 +153,21 @@ def test_every_verdict_is_told():
     for claim in PUBLISHED.values():
         if claim["verdict"] != "holds":
             assert f"`{claim['id']}`" in text, claim["id"]
+
+
+@pytest.mark.parametrize("of_paper", [True, False], ids=["Sec. II", "later"])
+def test_what_the_paper_says_of_observing_is_measured_on_its_own_method(of_paper, monkeypatch):
+    """Claims of Sec. II observe with method="paper" alone, those of all other sections never do."""
+    asked = set()
+
+    def observe(*arguments, **options):
+        asked.add(options.get("method", "people"))
+        return dollop.observe(*arguments, **options)
+
+    forget()
+    for module in (recordings, observing, environment):
+        monkeypatch.setattr(module, "observe", observe)
+    ids = [claim.id for claim in CLAIMS.values() if (claim.section == "II") == of_paper]
+    assert study.work(0, ids)[2] == [] and len(ids) > 6
+    assert asked == {"paper" if of_paper else "people"}
+    forget()
