@@ -153,7 +153,8 @@ def candidates(beam, x, y, ranges, pose, step):
         sum_x, sum_y = sum_x / count, sum_y / count
         ux, uy = sum_x - pose[0], sum_y - pose[1]
         distance = hypot(ux, uy) or 1e-9
-        width = min((left - right + 1) * step * distance, WIDEST)
+        angle = (left - right + 1) * step
+        width = min(angle * distance / max(1 - pi / 8 * angle, 0.5), WIDEST)  # of a disc, whose edges lie deeper
         hidden = 2.0 if before < -EDGE and after < -EDGE else float(after < -EDGE) - float(before < -EDGE)
         found = (
             sum_x,

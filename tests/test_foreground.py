@@ -1,4 +1,4 @@
-"""Sec. II: foreground cells, the autoregressive foreground grid, blobs and foreground objects."""
+"""Sec. II: foreground cells, the autoregressive foreground grid, blobs, foreground objects, and what stands."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from dollop.foreground import (
     ForegroundGrid,
+    SeenFloor,
+    StandingCells,
     _blob_centroids,
     _closed_up,
     bounding_boxes,
@@ -251,3 +253,112 @@ def test_occupied_is_above_one_half():
         grid.update(can, pose, ANGLES, np.full(181, 2.5))
         np.testing.assert_allclose(grid.value[can], value)
         assert len(grid.blobs()) == len(grid.objects()) == count
+
+
+# ---- what stands, remembered in seconds
+
+POSE = np.array([4.0, 0.5, np.pi / 2])
+RATES = [4.5, 5.0, 10.0, 20.0, 40.0]
+CAN = np.array([[4.01, 3.01]])
+CELL = hits(ForegroundGrid(room(), 1.0), *CAN[0])
+
+
+def look(cells, t, hit=True, ranges=None):
+    """One scan, in which a beam hits the can, or in its place goes on for 6 m or as far as it does."""
+    where = (CELL, CAN) if hit else (CELL[:0], CAN[:0])
+    cells.look(t, *where, POSE, ANGLES, np.full(181, ranges or (2.5 if hit else 6.0)))
+
+
+def looked(cells, seconds, rate, begin=0.0, **scan):
+    """Let a memory look, whenever it is due, at scans that come at a rate."""
+    for t in begin + np.arange(0, seconds, 1 / rate):
+        if cells.due(t):
+            look(cells, t, **scan)
+    return cells
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_what_is_hit_stands_after_a_time_whatever_the_rate(rate):
+    """Not yet after 0.8 s, and surely after 1.6 s, by lasers from 4.5 to 40 scans a second."""
+    for seconds, count in ((0.8, 0), (1.6, 1)):
+        cells = looked(StandingCells(room()), seconds, rate)
+        assert len(cells.standing()) == count
+    np.testing.assert_allclose(cells.standing(), [[4.01, 3.01, 4.0, 0.5, 0.0, np.inf]])
+    known = np.argwhere(np.isfinite(cells.known_since.reshape(160, 160)))
+    assert (cells.known_since[CELL] == 0.0).all()
+    np.testing.assert_array_equal(known, [(r, c) for r in (59, 60, 61) for c in (79, 80, 81)])  # 6 cm round it
+
+
+@given(st.lists(st.tuples(st.floats(0.15, 0.5), st.booleans()), min_size=1, max_size=15))
+def test_standing_follows_its_autoregression(steps):
+    """It stands where v <- v + (1 - exp(-dt / tau)) (hit - v), written out, exceeds a half, unless it is just going."""
+    cells, now, until, tau = StandingCells(room(), after=1.2), 0.0, 0.0, 1.2 / np.log(2)
+    look(cells, now)
+    value = 1 - np.exp(-0.15 / tau)
+    for dt, hit in steps:
+        now += dt
+        look(cells, now, hit)
+        gain = 1 - np.exp(-dt / tau)
+        value += gain * (hit - value)
+        value = 0.0 if not hit and value < 0.5 * gain else value  # is forgotten
+        until = now if hit else until
+        if abs(value - 0.5) > 1e-6 and abs(now - until - 0.6) > 1e-6:
+            assert len(cells.standing()) == (value > 0.5 and (hit or now - until < 0.6))
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_what_stands_in_the_shadow_stands_on(rate):
+    """However long somebody stands before it: neither does it fade, nor is it gone."""
+    cells = looked(StandingCells(room()), 2.0, rate)
+    looked(cells, 60.0, rate, begin=2.0, hit=False, ranges=1.0)
+    assert len(cells.standing()) == 1 and len(cells.stood()) == 0
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_what_goes_is_gone_with_when_and_where(rate):
+    """Where beams pass that hit before: from when until when it stood is known, to the time of a scan or two."""
+    cells = looked(StandingCells(room()), 3.0, rate, begin=1.0)
+    looked(cells, 3.0, rate, begin=4.0, hit=False)
+    assert len(cells.standing()) == 0 and np.isinf(cells.known_since).all()
+    ((*where, since, until),) = cells.stood()
+    assert where == pytest.approx([4.01, 3.01, 4.0, 0.5])
+    assert since == pytest.approx(1.0) and until == pytest.approx(4.0, abs=0.15 + 1 / rate)
+
+
+def test_a_pause_counts_for_no_more_than_half_a_second():
+    """Hit twice an hour apart does not stand; nor does what stands fade from one look after a pause."""
+    cells = StandingCells(room())
+    look(cells, 0.0)
+    look(cells, 3600.0)
+    assert len(cells.standing()) == 0
+    cells = looked(StandingCells(room()), 6.0, 10.0)
+    look(cells, 3600.0, hit=False)
+    assert len(cells.stood()) == 0
+
+
+def test_single_hits_never_stand():
+    """Once here and once there all over the room, for hours: nothing stands, and nothing stood."""
+    cells, rng, grid = StandingCells(room()), np.random.default_rng(0), ForegroundGrid(room(), 1.0)
+    for k in range(2000):
+        place = rng.uniform(1.0, 7.0, (1, 2))
+        cells.look(5.0 * k, hits(grid, *place[0]), place, POSE, ANGLES, np.full(181, 9.0))
+    assert len(cells.standing()) == len(cells.stood()) == 0 and np.isinf(cells.known_since).all()
+
+
+def test_the_floor_is_seen_where_beams_pass_and_end():
+    """Up to the reading and not behind it; what does not come back is not believed."""
+    floor, ranges = SeenFloor(room()), np.full(181, 3.0)
+    ranges[100:] = np.inf
+    floor.look(7.0, POSE, ANGLES, ranges)
+    places = np.array([[4.0, 2.0], [5.0, 2.0], [4.0, 3.35], [4.0, 4.0], [2.0, 2.0], [4.0, -3.0]])
+    assert floor.first_at(places).tolist() == [7.0, 7.0, 7.0, np.inf, np.inf, np.inf]
+    assert floor.grid().sum() == pytest.approx(np.pi * 3**2 / 4 / 0.01, rel=0.15)
+
+
+def test_the_floor_keeps_when_it_was_seen_first():
+    """A second look adds what is new, and changes no time; looks come no more often than once a second."""
+    floor, near, far = SeenFloor(room()), np.array([[4.0, 2.0]]), np.array([[4.0, 5.0]])
+    floor.look(1.0, POSE, ANGLES, np.full(181, 3.0))
+    assert not floor.due(1.5) and floor.due(2.0)
+    floor.look(2.0, POSE, ANGLES, np.full(181, 6.0))
+    assert floor.first_at(near) == 1.0 and floor.first_at(far) == 2.0

@@ -120,6 +120,29 @@ def test_smoothing_is_the_posterior_mean_through_gaps_and_an_uneven_clock(order)
     np.testing.assert_allclose(velocities, states[:, 1], atol=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_smoothing_weighs_every_measurement_by_its_own_standard_deviation(seed):
+    """The states of least squares, dense and written out, where some places are known better than others."""
+    rng, n, motion = np.random.default_rng(seed), 6, Motion(noise=0.3)
+    t, z = np.cumsum(rng.uniform(0.1, 0.4, n)), rng.normal(size=(n, 2))
+    sd = rng.uniform(0.02, 0.5, n)
+    z[3] = np.nan
+    rows, values = [np.eye(1, 2 * n, 1)], [np.zeros((1, 2))]  # unknown velocity at first: 0 +- 1 m/s
+    for i in range(n):
+        if np.isfinite(z[i, 0]):
+            rows.append(np.eye(1, 2 * n, 2 * i) / sd[i])
+            values.append(z[i : i + 1] / sd[i])
+        if i:
+            F, Q = motion.transition(t[i] - t[i - 1])
+            step = np.hstack([np.zeros((2, 2 * i - 2)), -F, np.eye(2), np.zeros((2, 2 * (n - 1 - i)))])
+            rows.append(np.linalg.solve(np.linalg.cholesky(Q), step))
+            values.append(np.zeros((2, 2)))
+    states = np.linalg.lstsq(np.vstack(rows), np.vstack(values), rcond=None)[0].reshape(n, 2, 2)
+    positions, velocities = smooth(t, z, motion, sd)
+    np.testing.assert_allclose(positions, states[:, 0], atol=1e-8)
+    np.testing.assert_allclose(velocities, states[:, 1], atol=1e-8)
+
+
 def test_out_of_sight_another_prediction_may_carry_on():
     """What carries on predicts to the hidden scans only, and the filter goes on from there."""
     t, z = np.arange(6.0), np.column_stack([np.arange(6.0), np.zeros(6)])

@@ -113,6 +113,8 @@ class FigureEights:
         What the laser saw, and the truth.
     observation : Observation
         What Dollop made of it (Sec. II).
+    observed_as_paper : Observation
+        The same by the paper's method, for what the paper says of it.
     laps : list of (N_k, 2) float arrays
         The five laps in m, cut out of the user's trajectory.
     task : Task
@@ -124,6 +126,10 @@ class FigureEights:
     @cached_property
     def observation(self):
         return observe(self.recording.log, background_map())
+
+    @cached_property
+    def observed_as_paper(self):
+        return observe(self.recording.log, background_map(), method="paper")
 
     @cached_property
     def laps(self):

@@ -1,5 +1,8 @@
 """Claims on observing the user: filtering, predicting and matching foreground objects (Sec. II).
 
+The paper's sentences are about the paper's way of observing, so all of these observe as it does:
+method="paper", where a position is the centroid of a blob and any foreground object may be the user.
+
 Where the truth is known, an estimate is compared with the place where a centroid of the walker is
 expected: the true place, moved towards the sensor by the mean distance between the walker and the
 centroids of that recording. The laser sees the near side only; this constant bias is told, and
@@ -37,9 +40,9 @@ __all__ = ["choose_noises"]
 
 
 def walked(seed):
-    """The user's track over the five figure-eights of a seed, and their recording."""
+    """The user's track, as the paper has it, over the five figure-eights of a seed, and their recording."""
     shown = recordings.figure_eights(seed)
-    return shown.observation.user, shown.recording
+    return shown.observed_as_paper.user, shown.recording
 
 
 def true_places(t, recording):
@@ -134,7 +137,7 @@ def walked_seen_ideally(seed):
     from dollop.lab import SickLMS200, record_figure_eights
 
     recording = record_figure_eights(seed, scanner=SickLMS200(noise=0.0, mixed=0.0))
-    return observe(recording.log, recordings.background_map()).user, recording
+    return observe(recording.log, recordings.background_map(), method="paper").user, recording
 
 
 # ---- predicting a hidden walker
@@ -485,8 +488,8 @@ def fastest(seed):
     having been faster by 0.3 m/s for 0.5 s.
     """
     shown = recordings.figure_eights(seed)
-    recording, alone = shown.recording, shown.observation
-    both = observe(with_stroller(recording, seed).log, recordings.background_map())
+    recording, alone = shown.recording, shown.observed_as_paper
+    both = observe(with_stroller(recording, seed).log, recordings.background_map(), method="paper")
     t = recording.log.t
     expected = expected_centroids(alone.user, recording, t)
     walking = np.linalg.norm(np.gradient(true_places(t, recording), t, axis=0), axis=1) > BRISK
@@ -555,4 +558,4 @@ def loss(seed):
     The tracks of `interpolation`, five laps each. Wanted: the 95 % interval (Wilson) of the paper's
     one in five demonstrations.
     """
-    return {"lost_per_lap": min(recordings.figure_eights(seed).observation.losses, 5) / 5}
+    return {"lost_per_lap": min(recordings.figure_eights(seed).observed_as_paper.losses, 5) / 5}

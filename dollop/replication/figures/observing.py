@@ -6,15 +6,16 @@ from matplotlib.patches import ConnectionPatch, Rectangle
 
 import dollop
 from dollop import lab, plot
+from dollop.environment import standing_boxes
 from dollop.foreground import ForegroundGrid, endpoints, foreground_mask
 from dollop.lab.truth import track_error
-from dollop.observation import STATIC_EVERY, foreground_hits, static_boxes
+from dollop.observation import STATIC_EVERY, foreground_hits
 from dollop.replication import drawing, recordings
 from dollop.replication.figures.panel import panel
 
 __all__ = []
 
-GAIN, STATIC_GAIN = 0.6, 0.1  # defaults of `dollop.observe`
+GAIN, STATIC_GAIN = 0.6, 0.1  # of `dollop.observe` with method="paper"
 
 
 @panel("1")
@@ -53,7 +54,7 @@ WAY = {  # stage: its place in the drawing, the paper's word for it, what does i
     "background": ((0, 0), "background map", dollop.OccupancyGrid.load, dollop.OccupancyGrid),
     "observe": ((2.7, 1.5), "observing the user", dollop.observe, dollop.Observation),
     "subgoals": ((5.4, 3), "computing subgoals", dollop.SequencedLDS.fit, dollop.SequencedLDS),
-    "configure": ((5.4, 0), "environment\nconfiguration", static_boxes, dollop.Environment),
+    "configure": ((5.4, 0), "environment\nconfiguration", standing_boxes, dollop.Environment),
     "associate": ((8.1, 1.5), "associating\nsubgoals", dollop.associate, dollop.Association),
     "map": ((10.95, 3), "mapping\ndemonstrations", dollop.match, dollop.Matching),
     "learn": ((13.65, 3), "learning the\ntask structure", dollop.SubgoalHMM.fit, dollop.SubgoalHMM),
@@ -121,15 +122,15 @@ def scan_beside_the_cans(log):
 def figure_4():
     """Flow diagram for observing the user.
 
-    Every stage with its own intermediate picture. The background map explains walls and desks (grey
-    dots); what is left are foreground cells (blue). They go two ways. A quick foreground grid
-    follows the user: the darker a cell, the more often it was hit of late; its blobs are the
-    foreground objects, each with its centroid (plus), and tracking these tells the user (blue) from
+    Every stage of the paper's method with its own intermediate picture. The background map explains
+    walls and desks (grey dots); what is left are foreground cells (blue). They go two ways. A quick
+    foreground grid follows the user: the darker a cell, the more often it was hit of late; its blobs
+    are the foreground objects, each with its centroid (plus), and tracking these tells the user (blue) from
     what stands still. A second, slower grid forgets the user and keeps the static objects. The two
     stages of the slower grid are drawn after the whole recording, all others at one moment of it.
     """
     shown, grid = recordings.figure_eights(), recordings.background_map()
-    log, observation = shown.recording.log, shown.observation
+    log, observation = shown.recording.log, shown.observed_as_paper
     i = scan_beside_the_cans(log)
     figure, axes = plt.subplots(2, 4, figsize=(10, 5.2), sharex=True, sharey=True)
     figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
@@ -214,23 +215,33 @@ def figure_5():
 SIZE = (6, 5.2)
 
 
-@panel("6a")
+@panel("6a", people="Dollop's own", paper="the paper's method")
 def figure_6a():
     """The track of the user during five demonstrations of a figure-eight.
 
-    Orange dots are Kalman predictions, made while the user was out of sight behind a can. The bias
-    is no error of tracking: a laser sees only the near side of a body. The track error is what
-    remains without it.
+    Orange dots are where the user was out of sight behind a can: the way there is bridged, in the
+    paper by Kalman predictions. A laser sees only the near side of a body, so the paper's centroids
+    are too near to it; Dollop's own positions, which are drawn, are the middle of the body, and that
+    bias is gone. The track error is what remains without it.
     """
     shown = recordings.figure_eights()
     recording, observation = shown.recording, shown.observation
-    user, sensor = observation.user, recording.log.poses[0]
     figure, ax = plt.subplots(figsize=SIZE)
-    plot.workspace(recordings.background_map(), sensor, observation.environment.boxes, ax)
-    plot.track(ax, user, "user's track", linewidth=0.8)
+    plot.workspace(recordings.background_map(), recording.log.poses[0], observation.environment.boxes, ax)
+    plot.track(ax, observation.user, "user's track", linewidth=0.8)
     drawing.legend_below(figure, ax)
-    bias, errors = track_error(user, recording.truth, sensor)
+    by_paper = track_numbers(shown.observed_as_paper, recording)
     return figure, {
+        **track_numbers(observation, recording),
+        **{f"paper_{name}": value for name, value in by_paper.items()},
+    }
+
+
+def track_numbers(observation, recording):
+    """How far the user's track is from the truth of a recording, how long it was hidden, and lost."""
+    user = observation.user
+    bias, errors = track_error(user, recording.truth, recording.log.poses[0])
+    return {
         "track_error_mean_m": errors.mean(),
         "track_error_p95_m": np.quantile(errors, 0.95),
         "track_error_max_m": errors.max(),
