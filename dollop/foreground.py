@@ -686,7 +686,7 @@ class SeenFloor:
         columns, rows = (slice(max(0, int(a)), max(0, int(b) + 1)) for a, b in zip(low, high, strict=True))
         cells = self._numbers[rows, columns].ravel()
         cells = cells[self.first[cells] == np.inf]
-        seen = seen_free(self._centres[cells], pose, angles, believed, -self.resolution)
+        seen = seen_free(self._centres[cells], pose, angles, believed, -self.resolution / 2)
         self.first[cells[seen]] = t
 
     def first_at(self, places):
