@@ -180,9 +180,11 @@ def _user(text):
     """Who the user is, as `dollop.observe` takes it: fastest, a place X,Y, or a number."""
     if text == "fastest":
         return text
-    if "," in text:
-        return tuple(float(part) for part in text.split(","))
-    return int(text)
+    try:
+        return tuple(map(float, text.split(","))) if text.count(",") == 1 else int(text)
+    except ValueError:
+        rule = "fastest, a place X,Y in m, or a number"
+        raise argparse.ArgumentTypeError(f"WHO must be {rule}, got {text!r:.60}") from None
 
 
 def _observe(options):
@@ -194,7 +196,7 @@ def _observe(options):
     if found.user is None:
         for note in found.notes:
             print(note, file=sys.stderr)
-        raise ValueError(f"nobody walks in {options.log}: {len(found.tracks)} tracks are of nobody")
+        raise ValueError(f"nobody walks in {options.log}; tracks of something else: {len(found.tracks)}")
     written = [out, picture]
     _write_track(found.user, out)
     _draw_observation(found, background, picture)

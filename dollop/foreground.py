@@ -11,12 +11,14 @@ import numpy as np
 import scipy
 
 from dollop.checks import check_positive
-from dollop.gridmap import flat_cells, in_metres
+from dollop.gridmap import flat_cells, in_cells, in_metres
 
 _PLACE, _SENSOR, _SINCE, _UNTIL, _STOOD = slice(0, 2), slice(2, 4), 4, 5, slice(0, 6)
 _VALUE, _PASSED, _LOOKS, _COLUMNS = 6, 7, 8, 9
 LONG_MEAN = 50
 """Looks over which the mean of a cell's readings is taken."""
+FLOOR_EVERY, FARTHEST_SEEN = 1.0, 20.0
+"""s: the floor is looked at no more often; and m up to which a beam is believed to have seen it."""
 SLOT = 0.15
 """s: what stands is looked at no more often, however fast the laser is."""
 LONGEST_STEP = 0.5
@@ -621,7 +623,7 @@ class StandingCells:
 
 
 class SeenFloor:
-    """Where beams have passed or ended, and when first (beyond the paper).
+    """The floor that has been seen, up to what stands on it, and when first (beyond the paper).
 
     Parameters
     ----------
@@ -629,16 +631,25 @@ class SeenFloor:
         Of its extent.
     resolution : float
         m per cell.
-    """
 
-    EVERY = 1.0  # s
+    Attributes
+    ----------
+    origin : (float, float)
+        Lower left corner in m.
+    shape : (int, int)
+        Rows and columns.
+    first : (H * W,) float array
+        When each cell was seen first, in s; `inf` where it never was.
+    """
 
     def __init__(self, background, resolution=0.10):
         self.origin, self.resolution = background.origin, resolution
-        self.shape = tuple(
-            np.ceil(np.multiply(background.occupancy.shape, background.resolution / resolution)).astype(int)
-        )
-        self.first = np.full(self.shape[0] * self.shape[1], np.inf)
+        size = np.multiply(background.occupancy.shape, background.resolution / resolution)
+        self.shape = tuple(np.ceil(size).astype(int))
+        row, column = np.indices(self.shape).reshape(2, -1)
+        self._centres = np.column_stack(in_metres(column + 0.5, row + 0.5, self.origin, resolution))
+        self._numbers = np.arange(len(self._centres)).reshape(self.shape)
+        self.first = np.full(len(self._centres), np.inf)
         self.last = None
 
     def due(self, t):
@@ -653,9 +664,9 @@ class SeenFloor:
         -------
         bool
         """
-        return self.last is None or t - self.last >= self.EVERY
+        return self.last is None or t - self.last >= FLOOR_EVERY
 
-    def look(self, t, pose, angles, ranges, farthest=20.0):
+    def look(self, t, pose, angles, ranges):
         """Take in one scan; a beam that does not come back is not believed.
 
         Parameters
@@ -666,18 +677,17 @@ class SeenFloor:
             Sensor x, y in m, theta in rad.
         angles, ranges : (B,) float arrays
             The scan.
-        farthest : float
-            m up to which a beam is believed.
         """
         self.last = t
-        back = np.isfinite(ranges) & (ranges < farthest)
-        bearings, reach = pose[2] + angles[back], ranges[back]
-        steps = ((reach - BEYOND) / self.resolution).astype(int).clip(0) + 1
-        along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
-        x = pose[0] + np.repeat(np.cos(bearings), steps) * along * self.resolution
-        y = pose[1] + np.repeat(np.sin(bearings), steps) * along * self.resolution
-        cells, _ = flat_cells(np.column_stack([x, y]), self.origin, self.resolution, self.shape)
-        self.first[cells] = np.minimum(self.first[cells], t)
+        believed = np.where(ranges < FARTHEST_SEEN, ranges, 0.0)
+        reach = believed.max() + self.resolution
+        low = in_cells(pose[0] - reach, pose[1] - reach, self.origin, self.resolution)
+        high = in_cells(pose[0] + reach, pose[1] + reach, self.origin, self.resolution)
+        columns, rows = (slice(max(0, int(a)), max(0, int(b) + 1)) for a, b in zip(low, high, strict=True))
+        cells = self._numbers[rows, columns].ravel()
+        cells = cells[self.first[cells] == np.inf]
+        seen = seen_free(self._centres[cells], pose, angles, believed, -self.resolution / 2)
+        self.first[cells[seen]] = t
 
     def first_at(self, places):
         """When a place was seen first.
@@ -698,10 +708,10 @@ class SeenFloor:
         return found
 
     def grid(self):
-        """What has been seen by now, gaps between beams closed.
+        """What has been seen by now.
 
         Returns
         -------
         (H, W) bool array
         """
-        return scipy.ndimage.binary_closing(np.isfinite(self.first).reshape(self.shape), np.ones((3, 3)))
+        return np.isfinite(self.first).reshape(self.shape)

@@ -267,7 +267,7 @@ class OccupancyGrid:
         distances.flags.writeable = False
         return distances
 
-    def way_length(self, place, other, radius=0.15):
+    def way_length(self, place, other, radius=0.15, most=np.inf):
         """Length of the shortest way on foot from a place to another, round what is occupied.
 
         Parameters
@@ -276,11 +276,13 @@ class OccupancyGrid:
             In m.
         radius : float
             Kept from what is occupied, in m.
+        most : float
+            In m: a longer way is not looked for.
 
         Returns
         -------
         float
-            In m; `inf` where there is no way.
+            In m; `inf` where there is no way, or only a longer one.
 
         Examples
         --------
@@ -298,7 +300,7 @@ class OccupancyGrid:
             return straight
         free, origin, side, graph = self._walkable(radius)
         start, goal = (self._nearest_free(each, free, origin, side) for each in (place, other))
-        length = scipy.sparse.csgraph.dijkstra(graph, directed=False, indices=start)[goal]
+        length = scipy.sparse.csgraph.dijkstra(graph, directed=False, indices=start, limit=most)[goal]
         return max(straight, float(length))
 
     def _walkable(self, radius):

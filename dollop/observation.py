@@ -505,9 +505,8 @@ def user_notes(user, person, people, tracks, choice):
     """What is in doubt about the user."""
     if isinstance(choice, str):
         mine = moving_speed(user)
-        near = [
-            fast for fast, who in zip(fastness(people), people, strict=True) if who is not user and fast > mine - ALIKE
-        ]
+        others = [who is not user and could_be(user, who) is None for who in people]
+        near = [fast for fast in fastness(people)[others] if fast > mine - ALIKE]
         if near:
             speeds = f"{mine:.2f} and {max(near):.2f} m/s, less than {ALIKE:g} apart"
             yield Note("people", f"{1 + len(near)} people walk about as fast ({speeds})")

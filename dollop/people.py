@@ -437,12 +437,15 @@ def off_standing(pieces, stood, t):
     tree, kept = scipy.spatial.cKDTree(stood[:, :2]), []
     for rows in pieces:
         when = t[rows[:, 0].astype(int)]
-        on = np.zeros(len(rows), bool)
-        for k, cells in enumerate(tree.query_ball_point(rows[:, 1:3], ON + rows[:, 5] / 4)):
-            on[k] = ((stood[cells, 4] <= when[k] + 0.1) & (stood[cells, 5] >= when[k] + STAYS)).any()
-            if not on[k]:
+        first, until = 0, -np.inf
+        for place, now, width in zip(rows[:, 1:3], when, rows[:, 5], strict=True):
+            cells = stood[tree.query_ball_point(place, ON + width / 4)]
+            cells = cells[(cells[:, 4] <= now + 0.1) & (cells[:, 5] >= now + STAYS)]
+            if not len(cells):
                 break
-        first = int(on.sum())
+            first, until = first + 1, max(until, np.median(cells[:, 5]))
+        if 0 < first < len(rows) and until < when[first] + BEGAN:
+            first = 0  # what stood there left as the piece went on: it is who walks
         if len(rows) - first >= 3:
             kept.append(rows[first:])
     return kept
@@ -491,7 +494,8 @@ def joined(pieces, t, area, way=None, motion=None):
     area : float
         Of the floor where somebody new may come into sight, in m^2.
     way : callable, optional
-        way(place, other) is the length in m of the way between two places round the walls.
+        way(place, other, most) is the length in m of the way between two places round the walls,
+        `inf` if it is longer than `most`.
     motion : Motion, optional
         How people move.
 
@@ -578,7 +582,7 @@ def log_odds(last, first, area, way, motion):
     fit = np.logaddexp(log(1 - TURNS) + steady, log(TURNS) + abrupt)
     anew = -log(area) - 0.5 * np.sum(first[2] ** 2) - log(2 * pi)
     odds = fit - anew + PRIOR
-    if odds <= 0 or (way is not None and way(last[1], first[1]) > reach):
+    if odds <= 0 or (way is not None and way(last[1], first[1], most=reach) > reach):
         return 0.0
     return float(odds)
 
@@ -774,7 +778,7 @@ def bridge(t, places, velocities, when, pace):
 
     >>> there, ways = np.array([[0.0, 0.0], [0.0, 0.5]]), np.array([[1.0, 0.0], [-1.0, 0.0]])
     >>> bridge(np.array([0.0, 3.0]), there, ways, [1.5], pace=1.0)[0].round(1)
-    array([[1.3, 0.2]])
+    array([[1.4, 0.2]])
     """
     seconds, chord = t[1] - t[0], places[1] - places[0]
     speeds = np.hypot(*velocities.T)

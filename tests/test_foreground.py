@@ -352,7 +352,7 @@ def test_the_floor_is_seen_where_beams_pass_and_end():
     floor.look(7.0, POSE, ANGLES, ranges)
     places = np.array([[4.0, 2.0], [5.0, 2.0], [4.0, 3.35], [4.0, 4.0], [2.0, 2.0], [4.0, -3.0]])
     assert floor.first_at(places).tolist() == [7.0, 7.0, 7.0, np.inf, np.inf, np.inf]
-    assert floor.grid().sum() == pytest.approx(np.pi * 3**2 / 4 / 0.01, rel=0.15)
+    assert floor.grid().sum() == pytest.approx(np.pi * 3**2 / 4 / 0.01, rel=0.2)
 
 
 def test_the_floor_keeps_when_it_was_seen_first():
