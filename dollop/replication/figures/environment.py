@@ -27,11 +27,12 @@ def figure_8():
     """The eight objects on the left must be matched to those on the right.
 
     Here the left ones are above and the right ones below, drawn aside so that every line can be
-    told apart. The robust matching keeps each box together. The literal cost's lines cross between
-    boxes: forces within one box outweigh those between boxes, so errors of a few centimetres in a
-    box decide. Corners count from zero in the numbers: for 1 to 8, in this order, which of a (0) to
-    h (7) it goes to. The two costs have different units; the margin says how far behind the
-    second-best matching is.
+    told apart. The robust matching keeps each box together. Under the literal cost forces within
+    one box outweigh those between boxes, so errors of a few centimetres in a box decide: its lines
+    lie on the robust ones or cross between boxes as that comes, and its margin is a hair either
+    way. Corners count from zero in the numbers: for 1 to 8, in this order, which of a (0) to h (7)
+    it goes to. The two costs have different units; the margin says how far behind the second-best
+    matching is.
     """
     before, after = recordings.figure_eights().task.environment, recordings.moved_environment(0)
     literal, robust = match(before, after, method="literal"), match(before, after)

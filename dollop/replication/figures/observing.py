@@ -124,10 +124,11 @@ def figure_4():
 
     Every stage of the paper's method with its own intermediate picture. The background map explains
     walls and desks (grey dots); what is left are foreground cells (blue). They go two ways. A quick
-    foreground grid follows the user: the darker a cell, the more often it was hit of late; its blobs
-    are the foreground objects, each with its centroid (plus), and tracking these tells the user (blue) from
-    what stands still. A second, slower grid forgets the user and keeps the static objects. The two
-    stages of the slower grid are drawn after the whole recording, all others at one moment of it.
+    foreground grid follows the user: the darker a cell, the more often it was hit of late; its
+    blobs are the foreground objects, each with its centroid (plus), and tracking these tells the
+    user (blue) from what stands still. A second, slower grid forgets the user and keeps the static
+    objects. The two stages of the slower grid are drawn after the whole recording, all others at
+    one moment of it.
     """
     shown, grid = recordings.figure_eights(), recordings.background_map()
     log, observation = shown.recording.log, shown.observed_as_paper
