@@ -84,7 +84,7 @@ def test_a_pause_ends_every_piece():
     followed, distance = Followed(), [3.0, 3.2, 3.4, *[3.5] * 20]
     for begin, way in ((0.0, distance), (9.0, distance[::-1])):
         for k, x in enumerate(way):
-            followed.step(begin + 0.1 * k, [(x, 0.0, 1.0, 0.0, 0.4, 0.05, 0.0)])
+            followed.step(begin + 0.1 * k, [Candidate(x, 0.0, 1.0, 0.0, 0.4, 0.05, 0.0)])
     assert [each[:, 0].tolist() for each in followed.pieces()] == [[*range(23)], [*range(23, 46)]]
 
 
