@@ -10,7 +10,7 @@ from rooms import ANGLES, CANS, disc_scans, drawn_map, legs, nobody, room_map, s
 
 from dollop.laser import LaserLog
 from dollop.observation import observe
-from dollop.people import DOUBTFUL, Followed, best_assignment, bridge, candidates
+from dollop.people import DOUBTFUL, Candidate, Followed, best_assignment, bridge, candidates
 from dollop.trajectory import arc_length
 
 LONG = [2.6, 2.5, 4.0, 3.0]
