@@ -17,6 +17,8 @@ _PLACE, _SENSOR, _SINCE, _UNTIL, _STOOD = slice(0, 2), slice(2, 4), 4, 5, slice(
 _VALUE, _PASSED, _LOOKS, _COLUMNS = 6, 7, 8, 9
 LONG_MEAN = 50
 """Looks over which the mean of a cell's readings is taken."""
+THROUGH = 0.25
+"""m by which a beam must have gone on behind a place on the map to have gone through it."""
 FLOOR_EVERY, FARTHEST_SEEN = 1.0, 20.0
 """s: the floor is looked at no more often; and m up to which a beam is believed to have seen it."""
 SLOT = 0.15
@@ -204,6 +206,41 @@ def seen_free(points, pose, angles, ranges, margin=0.0):
     inside = bearing <= len(angles) * step
     beam = np.rint(np.interp(bearing, angles - right, np.arange(len(angles)))).astype(np.intp)
     return inside & (ranges[beam] > np.hypot(offset[:, 0], offset[:, 1]) + margin)
+
+
+def seen_through(places, pose, angles, ranges):
+    """How much of the background is in view of a scan, and how much of that the beams go through.
+
+    On a map that fits, hardly anything: what stands in the way of the background is nearer. Beams
+    beside the one at a place must go on as well, or the edges of furniture would count.
+
+    Parameters
+    ----------
+    places : (M, 2) float array
+        Where the map has something, in m.
+    pose : (3,) float array
+        Sensor x, y in m, theta in rad.
+    angles, ranges : (B,) float arrays
+        The scan; a beam that does not come back tells nothing.
+
+    Returns
+    -------
+    through, in_view : int
+        Numbers of places.
+
+    Examples
+    --------
+    The wall that the map has at 1 m is not there:
+
+    >>> angles = np.radians([-2.0, -1.0, 0.0, 1.0, 2.0])
+    >>> seen_through(np.array([[1.0, 0.0], [2.0, 0.0]]), np.zeros(3), angles, np.full(5, 2.0))
+    (1, 2)
+    """
+    believed = np.where(np.isfinite(ranges), ranges, 0.0)
+    in_view = seen_free(places, pose, angles, believed, -THROUGH)
+    aside = np.radians(1.0) * np.array([[0, 0, -1], [0, 0, 0], [0, 0, 1]])
+    through = [seen_free(places[in_view], pose + turn, angles, believed, THROUGH) for turn in aside]
+    return int(np.logical_and.reduce(through).sum()), int(in_view.sum())
 
 
 class ForegroundGrid:

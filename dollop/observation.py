@@ -15,6 +15,7 @@ from dollop.foreground import (
     endpoints,
     foreground_mask,
     seen_free,
+    seen_through,
     surface_points,
 )
 from dollop.gridmap import flat_cells, in_cells
@@ -60,6 +61,11 @@ MOVED_WITHIN = 5.0
 """s between the end of an object here and its beginning there for it to be the same."""
 STANDING_REACH = 0.5
 """m from the middle of somebody within which readings are theirs."""
+SAMPLE = 400
+"""Cells of the map that are looked at to see whether it fits."""
+MOST_THROUGH, OFF_MAP = 0.08, 0.10
+"""Share of the background in view that beams may go through, and of the user's places that may be where
+the map has no floor."""
 MOST_MOVING, SLOWEST = 0.25, 0.35
 """Share of the readings that are of nothing that stands, and s between scans, beyond which nothing is sure."""
 FOREGROUND = 1
@@ -189,7 +195,9 @@ class Observer:
         self._class = reading_classes(background, background_radius)
         self.motion, self.followed = Motion(), Followed()
         self.standing, self.floor = StandingCells(background), SeenFloor(background)
-        self.returned = self.outside = self.later = self.moving = 0
+        occupied = background.cell_centres(np.argwhere(background.occupied))
+        self._occupied = occupied[:: 1 + len(occupied) // SAMPLE]
+        self.returned = self.outside = self.later = self.moving = self.through = self.in_view = 0
         self._scan = None
 
     def step(self, t, ranges, pose):
@@ -240,6 +248,8 @@ class Observer:
                 self.standing.look(now, here, points[part], poses[i], self.angles, ranges[i])
             if self.floor.due(now):
                 self.floor.look(now, poses[i], self.angles, ranges[i])
+                through, in_view = seen_through(self._occupied, poses[i], self.angles, ranges[i])
+                self.through, self.in_view = self.through + through, self.in_view + in_view
         self._scan = poses[-1], self.angles, ranges[-1]
 
     def _readings(self, ranges, poses):
@@ -314,7 +324,7 @@ class Observer:
         )
         notes += tuple(map(part_note, environment.centres[in_part]))
         if user is not None:
-            notes += tuple(user_notes(user, who, people, tracks, self.user))
+            notes += tuple(user_notes(user, who, people, tracks, self.user, self.background))
         losses = 0 if who is None else len(who.gaps)
         return Observation(tuple(tracks), user, environment, losses, people, notes)
 
@@ -332,6 +342,10 @@ class Observer:
                 "slow scans",
                 f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s",
             )
+        share = self.through / max(self.in_view, 1)
+        if share > MOST_THROUGH:
+            text = f"beams go through {share:.0%} of what the map has in view (at most {MOST_THROUGH:.0%})"
+            yield Note("map", f"{text}: it does not fit the scans, or the poses are wrong")
         share = self.moving / max(self.later, 1)
         if share > MOST_MOVING:
             text = f"{share:.0%} of the readings are on nothing that stands or that the map knows"
@@ -501,7 +515,7 @@ def fastness(people):
     return np.where(ways >= LONG_ENOUGH * ways.max(), [moving_speed(track) for track in people], 0.0)
 
 
-def user_notes(user, person, people, tracks, choice):
+def user_notes(user, person, people, tracks, choice, background):
     """What is in doubt about the user."""
     if isinstance(choice, str):
         mine = moving_speed(user)
@@ -531,11 +545,24 @@ def user_notes(user, person, people, tracks, choice):
     seen = 1 - user.occluded.mean()
     if seen < LEAST_SEEN:
         yield Note("seen", f"the user was in sight for {seen:.0%} of the time (at least {LEAST_SEEN:.0%})")
+    off = 1 - on_floor(user.positions, background).mean()
+    if off > OFF_MAP:
+        yield Note(
+            "off the map", f"the user was for {off:.0%} of the time where the map has no floor (at most {OFF_MAP:.0%})"
+        )
     if user.speeds.max() > TOP_SPEED:
         yield Note(
             "speed",
             f"the user would have walked at {user.speeds.max():.1f} m/s (at most {TOP_SPEED:g})",
         )
+
+
+def on_floor(places, background):
+    """Whether each place (M, 2) is where the map knows of floor, (M,) bool."""
+    cells, inside = flat_cells(places, background.origin, background.resolution, background.occupancy.shape)
+    found = np.zeros(len(places), bool)
+    found[inside] = background.free.ravel()[cells]
+    return found
 
 
 def could_be(user, other):

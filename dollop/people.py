@@ -22,7 +22,9 @@ different people. Here a person is followed in three steps:
 
 from array import array
 from dataclasses import dataclass
+from itertools import combinations
 from math import hypot, log, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -32,6 +34,7 @@ from dollop.trajectory import arc_length, at_arc_length
 
 __all__ = [
     "BRIDGED",
+    "Candidate",
     "Followed",
     "MOVED",
     "OVERLAP",
@@ -57,8 +60,8 @@ OTHER_LEG = 0.10
 """m: where one leg is hidden, the middle is so far from the other."""
 WIDEST = 0.60
 """m: nobody is wider."""
-SURE, VAGUE = 0.05, 0.14
-"""Standard deviations in m of the middle of a body seen whole, or as two legs; of one leg or a body
+SURE, LEGS, VAGUE = 0.05, 0.07, 0.14
+"""Standard deviations in m of the middle of a body seen whole; of two legs; and of one leg, or a body
 half hidden."""
 GATE, GATE_MIN, GATE_MAX = 3.0, 0.45, 1.0
 """Standard deviations, and bounds in m, within which a candidate is taken for who was expected."""
@@ -111,6 +114,38 @@ STRAIGHT_ON, LOITERS = 0.7, 1.2
 """Cosine to the straight way from which on a way leads straight on, and how much longer it then may be."""
 
 
+class Candidate(NamedTuple):
+    """Who may be a person in one scan.
+
+    Attributes
+    ----------
+    x, y : float
+        Mean of the readings, on the near side, in m.
+    ux, uy : float
+        Direction of the line of sight.
+    width : float
+        Across it, in m; 0 for two legs, whose middle x and y are already.
+    sd : float
+        Standard deviation of the middle in m.
+    hidden : float
+        The side that something nearer hides: 1 left, -1 right, 2 both, 0 none.
+    """
+
+    x: float
+    y: float
+    ux: float
+    uy: float
+    width: float
+    sd: float
+    hidden: float
+
+    @property
+    def middle(self):
+        """(float, float) in m: that of a disc, whose near side is pi/4 of its radius before it."""
+        push = pi / 8 * self.width
+        return self.x + push * self.ux, self.y + push * self.uy
+
+
 def candidates(beam, x, y, ranges, pose, step):
     """Who may be a person in one scan.
 
@@ -129,10 +164,7 @@ def candidates(beam, x, y, ranges, pose, step):
 
     Returns
     -------
-    list of tuple
-        x, y of the near side in m, sight (2) from the sensor as a unit vector, width in m, standard
-        deviation in m, hidden side. The middle is half of the width times pi/4 behind the near
-        side; of two legs it is given itself, with width 0.
+    list of Candidate
     """
     n = len(beam)
     if n == 0:
@@ -156,32 +188,25 @@ def candidates(beam, x, y, ranges, pose, step):
         angle = (left - right + 1) * step
         width = min(angle * distance / max(1 - pi / 8 * angle, 0.5), WIDEST)  # of a disc, whose edges lie deeper
         hidden = 2.0 if before < -EDGE and after < -EDGE else float(after < -EDGE) - float(before < -EDGE)
-        found = (
-            sum_x,
-            sum_y,
-            ux / distance,
-            uy / distance,
-            width,
-            VAGUE if hidden else SURE,
-            hidden,
-        )
+        sd = VAGUE if hidden else SURE
+        found = Candidate(sum_x, sum_y, ux / distance, uy / distance, width, sd, hidden)
         (narrow if width < NARROW else whole).append(found)
     return whole + paired(narrow) if narrow else whole
 
 
 def paired(narrow):
     """Candidates of narrow ones: two within a stride are one person's legs, nearest pairs first."""
-    legs = [(each[0] + push * each[2], each[1] + push * each[3]) for each in narrow for push in [pi / 8 * each[4]]]
-    pairs = sorted(
-        (hypot(legs[i][0] - legs[j][0], legs[i][1] - legs[j][1]), i, j) for i in range(len(legs)) for j in range(i)
-    )
+    pairs = []
+    for (i, leg), (j, other) in combinations(enumerate(each.middle for each in narrow), 2):
+        apart = hypot(leg[0] - other[0], leg[1] - other[1])
+        if apart < STRIDE:
+            pairs.append((apart, i, j, ((leg[0] + other[0]) / 2, (leg[1] + other[1]) / 2)))
     used, found = set(), []
-    for apart, i, j in pairs:
-        if apart < STRIDE and not {i, j} & used:
+    for _, i, j, middle in sorted(pairs):
+        if not {i, j} & used:
             used |= {i, j}
-            x, y = (legs[i][0] + legs[j][0]) / 2, (legs[i][1] + legs[j][1]) / 2
-            found.append((x, y, *narrow[i][2:4], 0.0, SURE + 0.02, 0.0))
-    return found + [(*each[:5], VAGUE, each[6]) for i, each in enumerate(narrow) if i not in used]
+            found.append(Candidate(*middle, narrow[i].ux, narrow[i].uy, 0.0, LEGS, 0.0))
+    return found + [each._replace(sd=VAGUE) for i, each in enumerate(narrow) if i not in used]
 
 
 class Piece:
@@ -190,21 +215,7 @@ class Piece:
     Both axes share one covariance, P = [[pxx, pxv], [pxv, pvv]].
     """
 
-    __slots__ = [
-        "x",
-        "y",
-        "vx",
-        "vy",
-        "pxx",
-        "pxv",
-        "pvv",
-        "seen",
-        "rows",
-        "begin",
-        "far",
-        "anchor",
-        "arrived",
-    ]
+    __slots__ = ["x", "y", "vx", "vy", "pxx", "pxv", "pvv", "seen", "rows", "begin", "far", "anchor", "arrived"]
 
     def __init__(self, place, t):
         self.x, self.y, self.vx, self.vy = *place, 0.0, 0.0
@@ -249,7 +260,7 @@ class Followed:
 
     def __init__(self, motion=None):
         self.noise = (motion or Motion()).noise
-        self.t, self.alive, self.past, self.now = array("d"), [], [], None
+        self.t, self.alive, self.past = array("d"), [], []
 
     def standing(self):
         """Those who walked and may be standing now.
@@ -267,8 +278,7 @@ class Followed:
         ----------
         t : float
             Time in s, later than the last.
-        found : list of tuple
-            From `candidates`.
+        found : list of Candidate
         """
         scan = len(self.t)
         dt = t - self.t[-1] if scan else 0.0
@@ -289,11 +299,11 @@ class Followed:
 
     def _match(self, t, scan, found):
         """Greedily: nearest pairs of piece and candidate first; who is left over is somebody new."""
-        middles = [(x + pi / 8 * w * ux, y + pi / 8 * w * uy) for x, y, ux, uy, w, *_ in found]
+        middles = [each.middle for each in found]
         free, pairs = set(range(len(found))), []
         for k, piece in enumerate(self.alive):
             for m, (x, y) in enumerate(middles):
-                variance = piece.pxx + found[m][5] ** 2
+                variance = piece.pxx + found[m].sd ** 2
                 widest = GATE_MAX if piece.far > MOVED else GATE_MIN
                 widest = min(widest, AT_ONCE + FASTEST * (t - piece.seen))
                 gate = min(max(GATE * sqrt(variance), GATE_MIN), widest)
@@ -305,11 +315,11 @@ class Followed:
             if k not in taken and m in free:
                 taken.add(k)
                 free.discard(m)
-                self.alive[k].update(*middles[m], found[m][5] ** 2, t)
+                self.alive[k].update(*middles[m], found[m].sd ** 2, t)
                 self.alive[k].rows.extend((scan, *found[m]))
         for m in free:
             x, y = middles[m]
-            leg = found[m][4] < NARROW
+            leg = found[m].width < NARROW
             if leg and any(hypot(piece.x - x, piece.y - y) < ALONE and piece.seen == t for piece in self.alive):
                 continue
             piece = Piece((x, y), t)
@@ -649,6 +659,8 @@ def apart_where_confused(pieces, t):
         for begin, end in zip(when[holes], when[holes + 1], strict=True):
             between = np.array([np.interp((begin + end) / 2, when, column) for column in places[a].T])
             for b, other in enumerate(times):
+                if other[0] > end or other[-1] < begin:
+                    continue
                 there = (other >= begin) & (other <= end)
                 if b == a or not there.any():
                     continue

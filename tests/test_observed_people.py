@@ -10,7 +10,7 @@ from rooms import ANGLES, CANS, disc_scans, drawn_map, legs, nobody, room_map, s
 
 from dollop.laser import LaserLog
 from dollop.observation import observe
-from dollop.people import DOUBTFUL, Followed, best_assignment, bridge, candidates
+from dollop.people import DOUBTFUL, Candidate, Followed, best_assignment, bridge, candidates
 from dollop.trajectory import arc_length
 
 LONG = [2.6, 2.5, 4.0, 3.0]
@@ -84,7 +84,7 @@ def test_a_pause_ends_every_piece():
     followed, distance = Followed(), [3.0, 3.2, 3.4, *[3.5] * 20]
     for begin, way in ((0.0, distance), (9.0, distance[::-1])):
         for k, x in enumerate(way):
-            followed.step(begin + 0.1 * k, [(x, 0.0, 1.0, 0.0, 0.4, 0.05, 0.0)])
+            followed.step(begin + 0.1 * k, [Candidate(x, 0.0, 1.0, 0.0, 0.4, 0.05, 0.0)])
     assert [each[:, 0].tolist() for each in followed.pieces()] == [[*range(23)], [*range(23, 46)]]
 
 
