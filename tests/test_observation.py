@@ -432,6 +432,25 @@ def test_the_fastest_is_the_user_and_a_tie_is_noted():
             assert [note.kind for note in observation.notes] == ["people"]
 
 
+def test_who_darts_past_is_not_the_user():
+    """Twice as fast for a metre and a half: one of the people, but the user is who walked the long way."""
+    log = watched(together(walk([2, 4.5], [7, 4.5], speed=0.8), walk([3, 2], [4.6, 2], speed=1.6)))
+    observation = observe(log, room_map())
+    assert len(observation.people) == 2 and observation.trusted
+    np.testing.assert_allclose(observation.user.positions[0], [2, 4.5], atol=0.1)
+
+
+def test_what_is_pushed_slowly_is_an_object_again_where_it_stands():
+    """It stood, slid on and stands, while somebody else walks: in the end it is an object there, and that is noted."""
+    standing, pushed = np.tile([[[6.0, 2.0]]], (30, 1, 1)), walk([6.0, 2.0], [7.2, 2.6], speed=0.4)
+    thing = np.concatenate([standing, pushed, standing + [1.2, 0.6]])
+    log = watched(together(walk([2, 4.5], [7, 4.5], [2, 4.5], speed=1.1), thing))
+    observation = observe(log, room_map())
+    np.testing.assert_allclose(observation.user.positions[0], [2, 4.5], atol=0.1)
+    np.testing.assert_allclose(observation.environment.boxes, [[7.0, 2.4, 7.4, 2.8]], atol=0.06)
+    assert [note.kind for note in observation.notes] == ["object came"]
+
+
 def test_a_place_where_nobody_was_is_refused_with_who_was_where():
     """The error tells the place, and of everybody where they were first seen."""
     with pytest.raises(ValueError, match=r"nobody .* \(8.0, 6.0\) when .*: 0 at \(2.\d\d, 4.\d\d\), 1 at \((6.9|7.0)"):
