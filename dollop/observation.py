@@ -548,7 +548,8 @@ def user_notes(user, person, people, tracks, choice, background):
     off = 1 - on_floor(user.positions, background).mean()
     if off > OFF_MAP:
         yield Note(
-            "off the map", f"the user was for {off:.0%} of the time where the map has no floor (at most {OFF_MAP:.0%})"
+            "off the map",
+            f"the user was for {off:.0%} of the time where the map has no floor (at most {OFF_MAP:.0%})",
         )
     if user.speeds.max() > TOP_SPEED:
         yield Note(

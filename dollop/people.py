@@ -100,7 +100,7 @@ TURNS, ABRUPT = 0.1, 10.0
 CLOSE, BESIDE = 0.8, 0.6
 """m from somebody out of sight within which another may be taken for them; and within which both
 may be one candidate."""
-OVERLAP = 0.5
+OVERLAP = 1.2
 """s that somebody may be followed on, wrongly, after they have come into sight elsewhere."""
 SHORT_GAP = 0.15
 """s: who is out of sight for less cannot be confused."""
@@ -215,7 +215,21 @@ class Piece:
     Both axes share one covariance, P = [[pxx, pxv], [pxv, pvv]].
     """
 
-    __slots__ = ["x", "y", "vx", "vy", "pxx", "pxv", "pvv", "seen", "rows", "begin", "far", "anchor", "arrived"]
+    __slots__ = [
+        "x",
+        "y",
+        "vx",
+        "vy",
+        "pxx",
+        "pxv",
+        "pvv",
+        "seen",
+        "rows",
+        "begin",
+        "far",
+        "anchor",
+        "arrived",
+    ]
 
     def __init__(self, place, t):
         self.x, self.y, self.vx, self.vy = *place, 0.0, 0.0
@@ -369,8 +383,8 @@ def stood(gone, pieces, t, step):
     list of (n, 8) float arrays
         One for each thing that a person may be.
     """
-    groups = (group for group in together(gone) if not followed_there(group, pieces, t))
-    return [rows for group in groups if (rows := standing_rows(group, pieces, t, step)) is not None]
+    found = [standing_rows(group, pieces, t, step) for group in together(gone)]
+    return [rows for parts in found for rows in parts]
 
 
 def together(gone):
@@ -394,37 +408,32 @@ def together(gone):
     return [gone[label == k] for k in range(count)]
 
 
-def followed_there(group, pieces, t):
-    """Whether a piece was where a group of cells (G, 6) stood for most of that time."""
-    begin, end = group[:, 4].min(), np.median(group[:, 5])
-    when = np.linspace(begin, end, 20)
-    for rows in pieces:
-        lived = t[rows[:, 0].astype(int)]
-        there = np.column_stack([np.interp(when, lived, rows[:, axis]) for axis in (1, 2)])
-        near = np.linalg.norm(there - group[:, :2].mean(axis=0), axis=1) < ALONE
-        if (near & (when >= lived[0] - 0.1) & (when <= lived[-1] + 0.1)).mean() > 0.7:
-            return True
-    return False
-
-
 def standing_rows(group, pieces, t, step):
-    """Measurements (n, 8) of somebody who stood where a group of cells (G, 6) was, or None."""
+    """Measurements of somebody who stood where a group of cells (G, 6) was, as far as no piece has them.
+
+    A list of (n, 8) arrays, empty where what stood is wider than anybody.
+    """
     place, sensor = group[:, :2].mean(axis=0), group[:, 2:4].mean(axis=0)
     distance = np.linalg.norm(place - sensor)
     sight = (place - sensor) / distance
     width = np.ptp(group[:, :2] @ [-sight[1], sight[0]]) + step * distance
+    if width > WIDE:
+        return []
     begin, end = group[:, 4].min(), np.median(group[:, 5])
+    alone = (t >= begin) & (t <= end)
     for rows in pieces:
-        first = t[int(rows[0, 0])]
-        if abs(first - end) < BEGAN and np.linalg.norm(rows[0, 1:3] - place) < ALONE:
-            end = min(end, first - 1e-9)
-    scans = np.flatnonzero((t >= begin) & (t <= end))
-    if width > WIDE or len(scans) < 3:
-        return None
+        when = t[rows[:, 0].astype(int)]
+        here = (when >= begin) & (when <= end + BEGAN) & (np.linalg.norm(rows[:, 1:3] - place, axis=1) < ALONE)
+        if here.any():
+            alone &= (t < when[here][0]) | (t > when[here][-1])
+            alone &= (t < when[0]) | (when[0] < end - BEGAN)  # who begins to walk as it goes
+    scans = np.flatnonzero(alone)
+    parts = np.split(scans, np.flatnonzero(np.diff(scans) > 1) + 1)
     row = np.array([0.0, *place, *sight, min(width, WIDEST), SURE, 0.0])
-    rows = np.tile(row, (len(scans), 1))
-    rows[:, 0] = scans
-    return rows
+    found = [np.tile(row, (len(part), 1)) for part in parts if len(part) >= 3]
+    for rows, part in zip(found, [part for part in parts if len(part) >= 3], strict=True):
+        rows[:, 0] = part
+    return found
 
 
 def off_standing(pieces, stood, t):
