@@ -24,6 +24,7 @@ from dollop.people import (
     MOVED,
     OVERLAP,
     REACH,
+    SAME_PLACE,
     SLACK,
     Followed,
     candidates,
@@ -31,6 +32,7 @@ from dollop.people import (
     moving_speed,
     off_standing,
     person_of,
+    seen_badly,
     stood,
     together,
 )
@@ -51,8 +53,6 @@ STATIC_EVERY = 5
 """The paper's slow grid looks at every fifth scan: what is static is still there then."""
 METHODS = "people", "paper"
 """How somebody is observed: as people, or as the paper has it, every foreground object alike."""
-SAME_PLACE = 0.25
-"""m: what went and what stands there so near are the same, seen badly."""
 SLIDES = 0.6
 """m/s up to which who stood before and stands afterwards may be an object that was moved."""
 SHORTEST_LOOK = 1.5
@@ -307,7 +307,7 @@ class Observer:
         area = float(np.clip(self.background.free.sum() * self.background.resolution**2, 5.0, 200.0))
         stands, gone = self.standing.standing(), self.standing.stood()
         pieces = off_standing(self.followed.pieces(), np.vstack([stands, gone]), t)
-        standing = stood(gone, pieces, t, self.step_angle)
+        standing = stood(gone, stands, pieces, t, self.step_angle)
         pieces = sorted(standing + pieces, key=lambda each: each[0, 0])
         persons = joined(pieces, t, area, self.background.way_length, self.motion)
         tracks = [person_of(each, t, self.motion) for each in persons]
@@ -439,8 +439,7 @@ def went(gone, stands, people, min_area):
         wide = max(high - low)
         if end - begin < SHORTEST_LOOK or len(group) < 3 or wide**2 < min_area:
             continue
-        there_then = stands[stands[:, 4] < end, :2]  # what still stands and is the same, seen badly
-        if np.count_nonzero(nearest(there_then, group[:, :2]) < SAME_PLACE) > len(group) / 2:
+        if seen_badly(group, stands):
             continue
         place = (low + high) / 2
         if not any(was_there(track, place, begin, end) for track in people):
@@ -548,7 +547,8 @@ def user_notes(user, person, people, tracks, choice, background):
     off = 1 - on_floor(user.positions, background).mean()
     if off > OFF_MAP:
         yield Note(
-            "off the map", f"the user was for {off:.0%} of the time where the map has no floor (at most {OFF_MAP:.0%})"
+            "off the map",
+            f"the user was for {off:.0%} of the time where the map has no floor (at most {OFF_MAP:.0%})",
         )
     if user.speeds.max() > TOP_SPEED:
         yield Note(

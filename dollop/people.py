@@ -40,12 +40,14 @@ __all__ = [
     "OVERLAP",
     "Person",
     "REACH",
+    "SAME_PLACE",
     "SLACK",
     "candidates",
     "joined",
     "moving_speed",
     "off_standing",
     "person_of",
+    "seen_badly",
     "stood",
     "together",
 ]
@@ -79,6 +81,8 @@ OFTEN = 0.4
 ROW = 8
 """Numbers kept of a measurement: scan, x, y of the near side, sight (2), width, standard deviation,
 and the side that something nearer hides: 1 left, -1 right, 2 both, 0 none."""
+SAME_PLACE = 0.25
+"""m: what went and what stands there so near are the same, seen badly."""
 STOOD_LINK, WIDE = 0.35, 0.75
 """m: cells so near to each other stood and went together; what is wider than that is nobody."""
 BEGAN = 1.0
@@ -95,12 +99,14 @@ DOUBTFUL = 2.0
 """Log odds over the next best assignment below which a joint is not made."""
 END_SD = 1.3
 """How much worse than its measurements the place at the end of a piece is known."""
+BRIEF = 0.5
+"""s: a briefer piece is no rival."""
 TURNS, ABRUPT = 0.1, 10.0
 """Share of the joints at which somebody turns sharply, and how much more noise that is."""
 CLOSE, BESIDE = 0.8, 0.6
 """m from somebody out of sight within which another may be taken for them; and within which both
 may be one candidate."""
-OVERLAP = 0.5
+OVERLAP = 1.2
 """s that somebody may be followed on, wrongly, after they have come into sight elsewhere."""
 SHORT_GAP = 0.15
 """s: who is out of sight for less cannot be confused."""
@@ -215,7 +221,21 @@ class Piece:
     Both axes share one covariance, P = [[pxx, pxv], [pxv, pvv]].
     """
 
-    __slots__ = ["x", "y", "vx", "vy", "pxx", "pxv", "pvv", "seen", "rows", "begin", "far", "anchor", "arrived"]
+    __slots__ = [
+        "x",
+        "y",
+        "vx",
+        "vy",
+        "pxx",
+        "pxv",
+        "pvv",
+        "seen",
+        "rows",
+        "begin",
+        "far",
+        "anchor",
+        "arrived",
+    ]
 
     def __init__(self, place, t):
         self.x, self.y, self.vx, self.vy = *place, 0.0, 0.0
@@ -350,13 +370,14 @@ def worth_keeping(piece):
 # ---- what stood, and who walked from there
 
 
-def stood(gone, pieces, t, step):
+def stood(gone, stands, pieces, t, step):
     """Pieces of those who stood before they walked.
 
     Parameters
     ----------
-    gone : (G, 6) float array
-        Cells where something stood and is no more: place and sensor in m, since and until in s.
+    gone, stands : (G, 6) and (S, 6) float arrays
+        Cells where something stood and is no more, and where something stands: place and sensor in
+        m, since and until in s.
     pieces : list of (n, 8) float arrays
         From `Followed.pieces`.
     t : (T,) float array
@@ -369,8 +390,28 @@ def stood(gone, pieces, t, step):
     list of (n, 8) float arrays
         One for each thing that a person may be.
     """
-    groups = (group for group in together(gone) if not followed_there(group, pieces, t))
-    return [rows for group in groups if (rows := standing_rows(group, pieces, t, step)) is not None]
+    groups = [group for group in together(gone) if len(group) > 1 and not seen_badly(group, stands)]
+    found = [standing_rows(group, pieces, t, step) for group in groups]
+    return [rows for parts in found for rows in parts]
+
+
+def seen_badly(group, stands):
+    """Whether a group of cells went of which most still stands.
+
+    Parameters
+    ----------
+    group, stands : (G, 6) and (S, 6) float arrays
+        Cells, as for `stood`.
+
+    Returns
+    -------
+    bool
+    """
+    then = stands[stands[:, 4] < np.median(group[:, 5]), :2]
+    if not len(then):
+        return False
+    near = scipy.spatial.cKDTree(group[:, :2]).query(then)[0] < SAME_PLACE
+    return bool(np.count_nonzero(near) > len(group) / 2)
 
 
 def together(gone):
@@ -394,37 +435,32 @@ def together(gone):
     return [gone[label == k] for k in range(count)]
 
 
-def followed_there(group, pieces, t):
-    """Whether a piece was where a group of cells (G, 6) stood for most of that time."""
-    begin, end = group[:, 4].min(), np.median(group[:, 5])
-    when = np.linspace(begin, end, 20)
-    for rows in pieces:
-        lived = t[rows[:, 0].astype(int)]
-        there = np.column_stack([np.interp(when, lived, rows[:, axis]) for axis in (1, 2)])
-        near = np.linalg.norm(there - group[:, :2].mean(axis=0), axis=1) < ALONE
-        if (near & (when >= lived[0] - 0.1) & (when <= lived[-1] + 0.1)).mean() > 0.7:
-            return True
-    return False
-
-
 def standing_rows(group, pieces, t, step):
-    """Measurements (n, 8) of somebody who stood where a group of cells (G, 6) was, or None."""
+    """Measurements of somebody who stood where a group of cells (G, 6) was, as far as no piece has them.
+
+    A list of (n, 8) arrays, empty where what stood is wider than anybody.
+    """
     place, sensor = group[:, :2].mean(axis=0), group[:, 2:4].mean(axis=0)
     distance = np.linalg.norm(place - sensor)
     sight = (place - sensor) / distance
     width = np.ptp(group[:, :2] @ [-sight[1], sight[0]]) + step * distance
+    if width > WIDE:
+        return []
     begin, end = group[:, 4].min(), np.median(group[:, 5])
+    alone = (t >= begin) & (t <= end)
     for rows in pieces:
-        first = t[int(rows[0, 0])]
-        if abs(first - end) < BEGAN and np.linalg.norm(rows[0, 1:3] - place) < ALONE:
-            end = min(end, first - 1e-9)
-    scans = np.flatnonzero((t >= begin) & (t <= end))
-    if width > WIDE or len(scans) < 3:
-        return None
+        when = t[rows[:, 0].astype(int)]
+        here = (when >= begin) & (when <= end + BEGAN) & (np.linalg.norm(rows[:, 1:3] - place, axis=1) < ALONE)
+        if here.any():
+            alone &= (t < when[here][0]) | (t > when[here][-1])
+            alone &= (t < when[0]) | (when[0] < end - BEGAN)  # who begins to walk as it goes
+    scans = np.flatnonzero(alone)
+    parts = np.split(scans, np.flatnonzero(np.diff(scans) > 1) + 1)
     row = np.array([0.0, *place, *sight, min(width, WIDEST), SURE, 0.0])
-    rows = np.tile(row, (len(scans), 1))
-    rows[:, 0] = scans
-    return rows
+    found = [np.tile(row, (len(part), 1)) for part in parts if len(part) >= 3]
+    for rows, part in zip(found, [part for part in parts if len(part) >= 3], strict=True):
+        rows[:, 0] = part
+    return found
 
 
 def off_standing(pieces, stood, t):
@@ -524,7 +560,8 @@ def joined(pieces, t, area, way=None, motion=None):
         last = ends[i][1] if gaps[i, j] > 0 else end_before(pieces[i], pieces[j], t, motion)
         if last is not None:
             odds[i, j] = log_odds(last, ends[j][0], area, way, motion)
-    after, doubts = best_assignment(odds)
+    brief = np.array([np.ptp(t[rows[[0, -1], 0].astype(int)]) < BRIEF for rows in pieces])
+    after, doubts = best_assignment(odds, brief)
     persons, begun = [], set(after.values())
     for i in range(len(pieces)):
         if i in begun:
@@ -603,13 +640,15 @@ def normal(error, covariance):
     return -0.5 * fit - log(np.linalg.det(covariance)) - 2 * log(2 * pi)
 
 
-def best_assignment(odds):
+def best_assignment(odds, brief=None):
     """Which piece goes on as which, and where that is in doubt.
 
     Parameters
     ----------
     odds : (N, N) float array
         Log odds that piece i goes on as piece j, 0 where it cannot.
+    brief : (N,) bool array, optional
+        Pieces too brief to be a rival to another: none when not given.
 
     Returns
     -------
@@ -626,6 +665,7 @@ def best_assignment(odds):
     """
     after, doubts = {}, (set(), set())
     n = len(odds)
+    brief = np.zeros(n, bool) if brief is None else brief
     ends, begins = np.nonzero(odds)
     graph = scipy.sparse.coo_matrix((np.ones(len(ends)), (ends, n + begins)), (2 * n, 2 * n))
     _, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
@@ -634,10 +674,12 @@ def best_assignment(odds):
         values = odds[np.ix_(rows, columns)]
         chosen = scipy.optimize.linear_sum_assignment(values, maximize=True)
         total = values[chosen].sum()
+        rivals_only = np.where(brief[rows][:, None] | brief[columns], 0.0, values)
+        rivals_only[chosen] = values[chosen]
         for i, j in zip(*chosen, strict=True):
             if values[i, j] == 0:
                 continue
-            without = values.copy()
+            without = rivals_only.copy()
             without[i, j] = 0.0
             other = scipy.optimize.linear_sum_assignment(without, maximize=True)
             rivals = without[other].sum() > total - values[i, j] + 1e-9
