@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from places import ROOT
 
+from dollop.checks import Note
 from dollop.cli import main
 from dollop.environment import Environment
 from dollop.formats.files import FormatError
@@ -172,7 +173,7 @@ def test_sides_are_those_of_the_path():
 def test_a_note_makes_what_is_wrong_doubtful():
     """What a note says beforehand is not silent, and what was silent stays wrong though it is refused later."""
     doubtful, wrong = Judgement(), Judgement()
-    doubtful.listen([], {"observation": SimpleNamespace(notes=("two people walk",))})
+    doubtful.listen([], {"observation": SimpleNamespace(notes=(Note("people", "two people walk"),))})
     for each in (doubtful, wrong):
         each.blame("user wrong", True)
     wrong.refused = "adapt", "no matching"
