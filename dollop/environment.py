@@ -45,8 +45,10 @@ ROUND = 0.22
 """Share of its extent by which the near corner of a box is empty where what stands there is round."""
 APART, ONE_OBJECT = 0.40, 1.5
 """m: two surfaces nearer than that are one where no beam passes between, and make no larger box."""
-UNSURE = 0.20
-"""m between beams on a grazed face, from which on its end is not known."""
+CUT_OFF = 0.08
+"""m from an end that something hides within which a side of the box may lie farther out."""
+MOST_ADDED, UNSURE = 0.10, 0.15
+"""m that a face may go on beyond its last reading; and m between readings from which on its end is not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,10 +343,17 @@ def standing_boxes(places, sensors, step, scan=None, min_area=0.01):
         boxes.pop(j)
         boxes[i] = box_round(places[groups[i]], sensors[groups[i]], step)
     large = [k for k, (box, _) in enumerate(boxes) if np.prod(box[2:] - box[:2]) >= min_area and len(groups[k]) > 1]
-    ends = [hidden_ends(places[groups[k]], scan) for k in large]
     kept = np.array([boxes[k][0] for k in large]).reshape(-1, 4)
     assumed = np.array([boxes[k][1] for k in large], bool).reshape(-1, 4)
-    return kept, assumed, np.array([any(each) for each in ends], bool), [groups[k] for k in large]
+    ends = [hidden_ends(places[groups[k]], scan) for k in large]
+    for each, box, points in zip(assumed, kept, ends, strict=True):
+        each |= (np.abs(np.tile(points, 2) - box) < CUT_OFF).any(axis=0)
+    return (
+        kept,
+        assumed,
+        np.array([len(each) > 0 for each in ends], bool),
+        [groups[k] for k in large],
+    )
 
 
 def surfaces(places, sensors, step):
@@ -377,14 +386,16 @@ def box_round(places, sensors, step):
     for axis in range(2):
         half = spacing / 2
         if along[axis]:
-            grazing = np.abs(toward[1 - axis]) / np.linalg.norm(toward)
-            half = min(half / max(grazing, 1e-3), UNSURE / 2)
+            face, other = corner[1 - axis], sensors[:, 1 - axis].mean()
+            grazing = np.abs(face - other) / np.linalg.norm(toward)
+            half = min(half / max(grazing, 1e-3), MOST_ADDED)
             far = int(toward[axis] > 0)
             assumed[far, axis] = 2 * half >= UNSURE and not outside[far, axis]
             (high if far else low)[axis] += half if far else -half
         elif not outside[:, axis].any():
             low[axis] -= half
             high[axis] += half
+            assumed[:, axis] = 2 * half >= UNSURE
     for axis in np.flatnonzero(~along):
         if outside[:, axis].sum() == 1:
             depth = max(high[axis] - low[axis], high[1 - axis] - low[1 - axis])
@@ -439,15 +450,15 @@ def nothing_between(some, others, pose, angles, ranges):
 
 
 def hidden_ends(places, scan):
-    """Whether something nearer, or the edge of view, is beside the right and the left of a surface."""
-    if scan is None:
-        return False, False
-    pose, angles, ranges = scan
-    bearing, distance = bearings_of(places, pose)
+    """Ends (E, 2) in m of a surface, right and left, beside which is something nearer or the edge of view."""
     ends = []
-    for k, side in ((bearing.argmin(), -1), (bearing.argmax(), 1)):
-        beam = int(np.abs(angles - bearing[k]).argmin()) + side
-        while 0 <= beam < len(ranges) and abs(ranges[beam] - distance[k]) < 0.10:
-            beam += side
-        ends.append(not 0 <= beam < len(ranges) or bool(ranges[beam] < distance[k] - 0.10))
-    return tuple(ends)
+    if scan is not None:
+        pose, angles, ranges = scan
+        bearing, distance = bearings_of(places, pose)
+        for k, side in ((bearing.argmin(), -1), (bearing.argmax(), 1)):
+            beam = int(np.abs(angles - bearing[k]).argmin()) + side
+            while 0 <= beam < len(ranges) and abs(ranges[beam] - distance[k]) < 0.10:
+                beam += side
+            if not 0 <= beam < len(ranges) or ranges[beam] < distance[k] - 0.10:
+                ends.append(places[k])
+    return np.reshape(ends, (-1, 2))
