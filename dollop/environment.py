@@ -42,13 +42,15 @@ LINK, SPACINGS = 0.15, 2.2
 FLAT = 0.10
 """m: a box seen no deeper than this shows one face only."""
 ROUND = 0.22
-"""Share of its extent by which the near corner of a box is empty where what stands there is round."""
+"""Share of its extent by which the near corner of a box is empty where what stands there is
+round."""
 APART, ONE_OBJECT = 0.40, 1.5
 """m: two surfaces nearer than that are one where no beam passes between, and make no larger box."""
 CUT_OFF = 0.08
 """m from an end that something hides within which a side of the box may lie farther out."""
 MOST_ADDED, UNSURE = 0.10, 0.15
-"""m that a face may go on beyond its last reading; and m between readings from which on its end is not known."""
+"""m that a face may go on beyond its last reading; and m between readings from which on its end is
+not known."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,7 +67,8 @@ MOST_THROUGH, OFF_MAP = 0.08, 0.10
 """Share of the background in view that beams may go through, and of the user's places that may be where
 the map has no floor."""
 MOST_MOVING, SLOWEST = 0.25, 0.35
-"""Share of the readings that are of nothing that stands, and s between scans, beyond which nothing is sure."""
+"""Share of the readings that are of nothing that stands, and s between scans, beyond which nothing
+is sure."""
 FOREGROUND = 1
 NOBODY_THERE = 1.5
 """m from the place named beyond which nobody is meant."""
@@ -77,6 +78,9 @@ LEFT_OUT = 0.3
 """m that somebody who may be the user has walked to be missed."""
 LONGEST_BRIDGE, LEAST_SEEN, TOP_SPEED = 4.5, 0.6, 3.0
 """s, share and m/s beyond which a walk is in doubt."""
+LEFT_AFTER, LEFT_SHARE, WALKS_ON = 2.0, 0.25, 0.3
+"""s before the end of the scans, and share of the time in which they were followed, from which on somebody
+is missed who went so fast in m/s when seen last."""
 MAY_COME_BACK = 15.0
 """s after which nobody is taken for the same."""
 ALIKE = 0.15
@@ -324,7 +328,7 @@ class Observer:
         )
         notes += tuple(map(part_note, environment.centres[in_part]))
         if user is not None:
-            notes += tuple(user_notes(user, who, people, tracks, self.user, self.background))
+            notes += tuple(user_notes(user, who, people, tracks, self.user, self.background, t[-1]))
         losses = 0 if who is None else len(who.gaps)
         return Observation(tuple(tracks), user, environment, losses, people, notes)
 
@@ -514,7 +518,7 @@ def fastness(people):
     return np.where(ways >= LONG_ENOUGH * ways.max(), [moving_speed(track) for track in people], 0.0)
 
 
-def user_notes(user, person, people, tracks, choice, background):
+def user_notes(user, person, people, tracks, choice, background, now):
     """What is in doubt about the user."""
     if isinstance(choice, str):
         mine = moving_speed(user)
@@ -528,13 +532,20 @@ def user_notes(user, person, people, tracks, choice, background):
             "exchange",
             f"{when - user.t[0]:.1f} s after the user was first seen somebody else may have gone on",
         )
-    for other in tracks:
-        gap, way = could_be(user, other), arc_length(other.positions)[-1]
-        if gap is not None and way > LEFT_OUT:
-            yield Note(
-                "pieces",
-                f"somebody who was seen {gap:.1f} s apart and walked {way:.1f} m may be the user too",
-            )
+    apart = [(gap, arc_length(other.positions)[-1]) for other in tracks if (gap := could_be(user, other)) is not None]
+    missed = [(gap, way) for gap, way in apart if way > LEFT_OUT]
+    for gap, way in missed:
+        yield Note(
+            "pieces",
+            f"somebody who was seen {gap:.1f} s apart and walked {way:.1f} m may be the user too",
+        )
+    left = now - user.t[-1]
+    hides = person.went_behind and user.speeds[-1] > WALKS_ON
+    if hides and not missed and left > max(LEFT_AFTER, LEFT_SHARE * np.ptp(user.t)):
+        yield Note(
+            "lost",
+            f"the user went behind something {left:.1f} s before the end and was seen no more",
+        )
     longest = np.diff(person.gaps).max(initial=0)
     if longest > LONGEST_BRIDGE:
         yield Note(

@@ -53,7 +53,8 @@ __all__ = [
 ]
 
 JUMP, SPREAD = 0.12, 1.5
-"""Neighbouring readings farther apart than `JUMP` m plus `SPREAD` beam spacings are different surfaces."""
+"""Neighbouring readings farther apart than `JUMP` m plus `SPREAD` beam spacings are different
+surfaces."""
 EDGE = 0.10
 """m: a neighbouring beam so much nearer or farther has met something else."""
 NARROW, STRIDE = 0.26, 0.65
@@ -68,7 +69,8 @@ half hidden."""
 GATE, GATE_MIN, GATE_MAX = 3.0, 0.45, 1.0
 """Standard deviations, and bounds in m, within which a candidate is taken for who was expected."""
 AT_ONCE, FASTEST = 0.35, 3.0
-"""m, and m/s: nobody is farther from where they were seen last; more is another one who was hidden."""
+"""m, and m/s: nobody is farther from where they were seen last; more is another one who was
+hidden."""
 PATIENCE = 1.0
 """s out of sight after which a piece ends: what comes then is for `joined` to say."""
 ALONE = 0.65
@@ -86,7 +88,8 @@ SAME_PLACE = 0.25
 STOOD_LINK, WIDE = 0.35, 0.75
 """m: cells so near to each other stood and went together; what is wider than that is nobody."""
 BEGAN = 1.0
-"""s: who begins to walk so soon before or after what stood there was seen last is who stood there."""
+"""s: who begins to walk so soon before or after what stood there was seen last is who stood
+there."""
 ON, STAYS = 0.20, 0.5
 """m, and a quarter of its width, from a cell that stands within which a measurement is of what
 stands; and s that it goes on to."""
@@ -115,9 +118,11 @@ MOMENT = 0.8
 BRIDGED = 0.5
 """s out of sight from which on what is between is a bridge."""
 SLOW, MOST_SWING = 0.25, 4.0
-"""m/s below which somebody stands; and by how much more than on a straight way a bridge may swing out."""
+"""m/s below which somebody stands; and by how much more than on a straight way a bridge may swing
+out."""
 STRAIGHT_ON, LOITERS = 0.7, 1.2
-"""Cosine to the straight way from which on a way leads straight on, and how much longer it then may be."""
+"""Cosine to the straight way from which on a way leads straight on, and how much longer it then may
+be."""
 
 
 class Candidate(NamedTuple):
@@ -517,6 +522,11 @@ class Person:
     rows: np.ndarray
     gaps: np.ndarray
     doubts: tuple
+
+    @property
+    def went_behind(self):
+        """Bool: whether something hid a part of them when they were seen last."""
+        return bool((self.rows[-3:, 7] != 0).any())
 
 
 def middles_of(rows, behind=None):
