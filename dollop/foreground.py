@@ -580,6 +580,8 @@ class StandingCells:
             self._remember(np.unique(cells[fresh]), t)
             rows = self._row[cells]
         table = self._table[: self._count]
+        anew = rows[(table[rows, _VALUE] <= 0.5) & (table[rows, _PASSED] > table[rows, _UNTIL])]
+        table[anew, _SINCE], table[anew, _LOOKS] = t, 0.0  # it had gone, and is another
         table[rows, _LOOKS] += 1
         weight = 1 / np.minimum(table[rows, _LOOKS], LONG_MEAN)
         table[rows, _PLACE] += (points - table[rows, _PLACE]) * weight[:, None]
@@ -659,6 +661,12 @@ class StandingCells:
         return np.array(list(self.gone.values())).reshape(-1, 6)
 
 
+def in_a_row(flags):
+    """Which of the flags (B,) bool are set together with two on either side, as far as there are."""
+    padded = np.pad(flags, 2, constant_values=True)
+    return np.logical_and.reduce([padded[k : k + len(flags)] for k in range(5)])
+
+
 class SeenFloor:
     """The floor that has been seen, up to what stands on it, and when first (beyond the paper).
 
@@ -687,7 +695,7 @@ class SeenFloor:
         self._centres = np.column_stack(in_metres(column + 0.5, row + 0.5, self.origin, resolution))
         self._numbers = np.arange(len(self._centres)).reshape(self.shape)
         self.first = np.full(len(self._centres), np.inf)
-        self.last = None
+        self.last, self._farthest = None, 0.0
 
     def due(self, t):
         """Whether it is time for another look.
@@ -704,7 +712,10 @@ class SeenFloor:
         return self.last is None or t - self.last >= FLOOR_EVERY
 
     def look(self, t, pose, angles, ranges):
-        """Take in one scan; a beam that does not come back is not believed.
+        """Take in one scan.
+
+        A beam that does not come back is believed, as far as any has come back, if its neighbours
+        do not either; alone it is a reading that was missed.
 
         Parameters
         ----------
@@ -717,6 +728,8 @@ class SeenFloor:
         """
         self.last = t
         believed = np.where(ranges < FARTHEST_SEEN, ranges, 0.0)
+        self._farthest = max(self._farthest, believed.max())
+        believed[in_a_row(np.isinf(ranges))] = self._farthest
         reach = believed.max() + self.resolution
         low = in_cells(pose[0] - reach, pose[1] - reach, self.origin, self.resolution)
         high = in_cells(pose[0] + reach, pose[1] + reach, self.origin, self.resolution)

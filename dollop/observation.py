@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from dollop.checks import Note, check_choice, check_positive, checked_array, trusted
+from dollop.checks import Note, check_choice, check_positive, checked_array, checked_number, trusted
 from dollop.environment import Environment, Seen, standing_boxes
 from dollop.foreground import (
     ForegroundGrid,
@@ -18,7 +18,7 @@ from dollop.foreground import (
     seen_through,
     surface_points,
 )
-from dollop.gridmap import flat_cells, in_cells
+from dollop.gridmap import OccupancyGrid, flat_cells, in_cells
 from dollop.people import (
     BRIDGED,
     MOVED,
@@ -61,6 +61,10 @@ MOVED_WITHIN = 5.0
 """s between the end of an object here and its beginning there for it to be the same."""
 STANDING_REACH = 0.5
 """m from the middle of somebody within which readings are theirs."""
+RESOLUTIONS = 0.005, 1.0
+"""m: cells of a map that can be observed on."""
+LONGEST_PAUSE = 1.0
+"""s without a scan, from which on somebody may be lost."""
 SAMPLE = 400
 """Cells of the map that are looked at to see whether it fits."""
 MOST_THROUGH, OFF_MAP = 0.08, 0.10
@@ -81,6 +85,8 @@ LONGEST_BRIDGE, LEAST_SEEN, TOP_SPEED = 4.5, 0.6, 3.0
 LEFT_AFTER, LEFT_SHARE, WALKS_ON = 2.0, 0.25, 0.3
 """s before the end of the scans, and share of the time in which they were followed, from which on somebody
 is missed who went so fast in m/s when seen last."""
+BESIDE_USER = 0.6
+"""m from the user within which nobody else begins or ends."""
 MAY_COME_BACK = 15.0
 """s after which nobody is taken for the same."""
 ALIKE = 0.15
@@ -188,10 +194,15 @@ class Observer:
     """
 
     def __init__(self, background, angles, user="fastest", background_radius=0.20, min_area=0.01):
-        check_positive("background_radius", background_radius)
-        check_positive("min_area", min_area, or_zero=True)
+        if not isinstance(background, OccupancyGrid):
+            raise ValueError(f"background must be an OccupancyGrid, got {background!r:.60}")
+        checked_number("the background's resolution", background.resolution, *RESOLUTIONS)
+        check_positive("background_radius", checked_number("background_radius", background_radius))
+        check_positive("min_area", checked_number("min_area", min_area), or_zero=True)
         self.background, self.user, self.min_area = background, checked_user(user), min_area
         angles = checked_array("angles", angles, "B")
+        if not angles.size or not (np.diff(angles) > 0).all() or np.ptp(angles) > 2 * np.pi + 1e-6:
+            raise ValueError(f"angles must increase, from one beam on, over at most a full turn, got {angles}")
         self._middle = (angles[0] + angles[-1]) / 2  # bearings are counted from the middle of view
         self.angles = angles - self._middle
         self.step_angle = float(np.median(np.diff(angles))) if len(angles) > 1 else np.radians(1.0)
@@ -224,9 +235,9 @@ class Observer:
         ranges = checked_array("ranges", ranges, len(self.angles), finite=False)
         if not (ranges >= 0).all():
             raise ValueError(f"a range must not be negative or NaN, got {ranges[~(ranges >= 0)][0]}")
-        pose, t = checked_array("pose", pose, 3), float(t)
-        if not np.isfinite(t) or (self.followed.t and t <= self.followed.t[-1]):
-            raise ValueError(f"t must be later than the last scan's {self.followed.t[-1:].tolist()}, got {t}")
+        pose, t = checked_array("pose", pose, 3), checked_number("t", t)
+        if self.followed.t and t <= self.followed.t[-1]:
+            raise ValueError(f"t must be later than the last scan's {self.followed.t[-1]}, got {t}")
         self._take_all(np.array([t]), ranges[None], pose[None])
 
     def _take_all(self, t, ranges, poses):
@@ -346,6 +357,9 @@ class Observer:
                 "slow scans",
                 f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s",
             )
+        pause = float(np.diff(self.followed.t).max(initial=0.0))
+        if pause > max(LONGEST_PAUSE, 3 * period):
+            yield Note("pause", f"there is no scan for {pause:.4g} s: nobody is followed through that")
         share = self.through / max(self.in_view, 1)
         if share > MOST_THROUGH:
             text = f"beams go through {share:.0%} of what the map has in view (at most {MOST_THROUGH:.0%})"
@@ -359,10 +373,8 @@ class Observer:
     def _environment(self, stands, people, user):
         """The objects that stand at the end, the cells (S_k, 6) of each, and which are seen in part."""
         for track in people:
-            since = arrival(track)
-            if track.t[-1] > self.followed.t[-1] - 1.0 and (track is user or not slides(track)):
-                there = np.linalg.norm(stands[:, :2] - track.positions[-1], axis=1) < STANDING_REACH
-                stands = stands[~(there & (stands[:, 4] >= since - 0.5))]
+            if track is user or not slides(track):
+                stands = stands[~stood_by(track, stands, self.followed.t[-1])]
         found = standing_boxes(stands[:, :2], stands[:, 2:4], self.step_angle, self._scan, self.min_area)
         boxes, assumed, in_part, groups = found
         seen = Seen(self.floor.grid(), self.floor.origin, self.floor.resolution)
@@ -410,10 +422,14 @@ def part_note(place):
     return Note("in part", f"{where} goes on behind something, or out of view: it may be larger", False)
 
 
-def arrival(track):
-    """When, in s, somebody came to where they stand at the end; -inf if they have always been there."""
-    away = track.t[np.linalg.norm(track.positions - track.positions[-1], axis=1) > 0.5]
-    return float(away[-1]) if len(away) else -np.inf
+def stood_by(track, stands, now):
+    """Which cells (S, 6) stand only because somebody stood there, and went at most a moment ago."""
+    since, until = stands[:, 4], np.minimum(stands[:, 5], now)
+    near = np.ones(len(stands), bool)
+    for when in (since + 0.5, until):
+        there = np.column_stack([np.interp(when, track.t, axis) for axis in track.positions.T])
+        near &= np.linalg.norm(there - stands[:, :2], axis=1) < STANDING_REACH
+    return near & (since >= track.t[0] - 0.5) & (until <= track.t[-1] + 1.0)
 
 
 def slides(track):
@@ -452,9 +468,13 @@ def went(gone, stands, people, min_area):
 
 
 def was_there(track, place, begin, end):
-    """Whether somebody stood at a place before the end of a time, most of its last two seconds."""
-    when = (track.t > max(begin, end - 2.0)) & (track.t < end)
-    return bool(when.any() and (np.linalg.norm(track.positions[when] - place, axis=1) < STANDING_REACH).mean() > 0.6)
+    """Whether somebody stood at a place most of the time, or of its last two seconds."""
+    for first in (begin, max(begin, end - 2.0)):
+        when = (track.t > first) & (track.t < end)
+        near = np.linalg.norm(track.positions[when] - place, axis=1) < STANDING_REACH
+        if near.sum() > 0.6 * max(np.count_nonzero(when), 1):
+            return True
+    return False
 
 
 def unlike(box, other):
@@ -539,6 +559,11 @@ def user_notes(user, person, people, tracks, choice, background, now):
             "pieces",
             f"somebody who was seen {gap:.1f} s apart and walked {way:.1f} m may be the user too",
         )
+    for when in beside(user, others=[who for who in tracks if who is not user]):
+        yield Note(
+            "exchange", f"{when - user.t[0]:.1f} s after the user was first seen a track beside them begins or ends"
+        )
+        break
     left = now - user.t[-1]
     hides = person.went_behind and user.speeds[-1] > WALKS_ON
     if hides and not missed and left > max(LEFT_AFTER, LEFT_SHARE * np.ptp(user.t)):
@@ -566,6 +591,15 @@ def user_notes(user, person, people, tracks, choice, background, now):
             "speed",
             f"the user would have walked at {user.speeds.max():.1f} m/s (at most {TOP_SPEED:g})",
         )
+
+
+def beside(user, others):
+    """Times in s at which another track begins or ends where the user is in the middle of the walk."""
+    for other in others:
+        for when, place in ((other.t[0], other.positions[0]), (other.t[-1], other.positions[-1])):
+            there = [np.interp(when, user.t, axis) for axis in user.positions.T]
+            if user.t[0] + 1.0 < when < user.t[-1] - 1.0 and np.linalg.norm(there - place) < BESIDE_USER:
+                yield float(when)
 
 
 def on_floor(places, background):

@@ -71,6 +71,8 @@ GATE, GATE_MIN, GATE_MAX = 3.0, 0.45, 1.0
 AT_ONCE, FASTEST = 0.35, 3.0
 """m, and m/s: nobody is farther from where they were seen last; more is another one who was
 hidden."""
+ONE_LEG = 0.3
+"""By how much, as a share of the gate, one leg must be nearer than the pair to be the better candidate."""
 PATIENCE = 1.0
 """s out of sight after which a piece ends: what comes then is for `joined` to say."""
 ALONE = 0.65
@@ -140,6 +142,8 @@ class Candidate(NamedTuple):
         Standard deviation of the middle in m.
     hidden : float
         The side that something nearer hides: 1 left, -1 right, 2 both, 0 none.
+    leg_of : int
+        How many candidates before it the pair is of which it may be a leg; 0 for none.
     """
 
     x: float
@@ -149,6 +153,7 @@ class Candidate(NamedTuple):
     width: float
     sd: float
     hidden: float
+    leg_of: int = 0
 
     @property
     def middle(self):
@@ -206,18 +211,22 @@ def candidates(beam, x, y, ranges, pose, step):
 
 
 def paired(narrow):
-    """Candidates of narrow ones: two within a stride are one person's legs, nearest pairs first."""
+    """Candidates of narrow ones: two within a stride are one person's legs, nearest pairs first.
+
+    The legs of a pair are candidates too, should the other be a stray reading: they come after it.
+    """
     pairs = []
     for (i, leg), (j, other) in combinations(enumerate(each.middle for each in narrow), 2):
         apart = hypot(leg[0] - other[0], leg[1] - other[1])
         if apart < STRIDE:
             pairs.append((apart, i, j, ((leg[0] + other[0]) / 2, (leg[1] + other[1]) / 2)))
-    used, found = set(), []
+    single, used, found = [each._replace(sd=VAGUE) for each in narrow], set(), []
     for _, i, j, middle in sorted(pairs):
         if not {i, j} & used:
             used |= {i, j}
-            found.append(Candidate(*middle, narrow[i].ux, narrow[i].uy, 0.0, LEGS, 0.0))
-    return found + [each._replace(sd=VAGUE) for i, each in enumerate(narrow) if i not in used]
+            legs = single[i]._replace(leg_of=1), single[j]._replace(leg_of=2)
+            found += [Candidate(*middle, *single[i][2:4], 0.0, LEGS, 0.0), *legs]
+    return found + [each for i, each in enumerate(single) if i not in used]
 
 
 class Piece:
@@ -334,21 +343,24 @@ class Followed:
                 gate = min(max(GATE * sqrt(variance), GATE_MIN), widest)
                 apart = hypot(x - piece.x, y - piece.y)
                 if apart < gate:
-                    pairs.append((apart / gate, k, m))
+                    pairs.append((apart / gate + ONE_LEG * (found[m].leg_of > 0), k, m))
         taken = set()
         for _, k, m in sorted(pairs):
             if k not in taken and m in free:
                 taken.add(k)
-                free.discard(m)
+                free -= {m, *rivals_of(m, found)}
                 self.alive[k].update(*middles[m], found[m].sd ** 2, t)
-                self.alive[k].rows.extend((scan, *found[m]))
-        for m in free:
+                self.alive[k].rows.extend((scan, *found[m][:-1]))
+        for m in sorted(free):
             x, y = middles[m]
+            if m not in free:
+                continue
             leg = found[m].width < NARROW
             if leg and any(hypot(piece.x - x, piece.y - y) < ALONE and piece.seen == t for piece in self.alive):
                 continue
+            free -= set(rivals_of(m, found))
             piece = Piece((x, y), t)
-            piece.rows.extend((scan, *found[m]))
+            piece.rows.extend((scan, *found[m][:-1]))
             self.alive.append(piece)
 
     def pieces(self):
@@ -364,6 +376,13 @@ class Followed:
         kept = self.past + [piece for piece in self.alive if worth_keeping(piece)]
         rows = [np.frombuffer(piece.rows).reshape(-1, ROW).copy() for piece in kept]
         return sorted(rows, key=lambda each: each[0, 0])
+
+
+def rivals_of(m, found):
+    """Candidates that are no more if candidate m is somebody: its legs, or the pair that it is a leg of."""
+    if found[m].leg_of:
+        return [m - found[m].leg_of]
+    return [k for k in (m + 1, m + 2) if k < len(found) and found[k].leg_of == k - m]
 
 
 def worth_keeping(piece):
@@ -497,9 +516,18 @@ def off_standing(pieces, stood, t):
             first, until = first + 1, max(until, np.median(cells[:, 5]))
         if 0 < first < len(rows) and until < when[first] + BEGAN:
             first = 0  # what stood there left as the piece went on: it is who walks
-        if len(rows) - first >= 3:
+        if len(rows) - first >= 3 and not flickers(rows, when, stood, tree):
             kept.append(rows[first:])
     return kept
+
+
+def flickers(rows, when, stood, tree):
+    """Whether a piece hardly moves, by something that stood there before it came."""
+    if np.linalg.norm(rows[:, 1:3] - rows[0, 1:3], axis=1).max() > MOVED:
+        return False
+    old = (stood[:, 4] < when[0] - STAYS) & (stood[:, 5] > when[-1])
+    near = tree.query_ball_point(rows[:, 1:3], ON)
+    return bool(np.mean([old[cells].any() for cells in near]) > 0.5)
 
 
 # ---- pieces of one person's way
