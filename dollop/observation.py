@@ -235,7 +235,9 @@ class Observer:
         ranges = checked_array("ranges", ranges, len(self.angles), finite=False)
         if not (ranges >= 0).all():
             raise ValueError(f"a range must not be negative or NaN, got {ranges[~(ranges >= 0)][0]}")
-        pose, t = checked_array("pose", pose, 3), checked_number("t", t)
+        pose = checked_array("pose", pose, 3)
+        if isinstance(t, bool) or not isinstance(t, int | float | np.number) or not np.isfinite(t):
+            raise ValueError(f"t must be a finite number of s, got {t!r:.60}")
         if self.followed.t and t <= self.followed.t[-1]:
             raise ValueError(f"t must be later than the last scan's {self.followed.t[-1]}, got {t}")
         self._take_all(np.array([t]), ranges[None], pose[None])

@@ -346,13 +346,17 @@ def test_single_hits_never_stand():
 
 
 def test_the_floor_is_seen_where_beams_pass_and_end():
-    """Up to the reading and not behind it; what does not come back is not believed."""
+    """Up to the reading, not behind it; what does not come back counts as far as any did, unless it is alone."""
     floor, ranges = SeenFloor(room()), np.full(181, 3.0)
-    ranges[100:] = np.inf
+    ranges[100:] = 0.5
+    ranges[[130, 134, 138, 142]] = np.inf
     floor.look(7.0, POSE, ANGLES, ranges)
     places = np.array([[4.0, 2.0], [5.0, 2.0], [4.0, 3.35], [4.0, 4.0], [2.0, 2.0], [4.0, -3.0]])
     assert floor.first_at(places).tolist() == [7.0, 7.0, 7.0, np.inf, np.inf, np.inf]
     assert floor.grid().sum() == pytest.approx(np.pi * 3**2 / 4 / 0.01, rel=0.2)
+    ranges[100:] = np.inf
+    floor.look(8.0, POSE, ANGLES, ranges)
+    assert floor.first_at(places).tolist() == [7.0, 7.0, 7.0, np.inf, 8.0, np.inf]
 
 
 def test_the_floor_keeps_when_it_was_seen_first():
