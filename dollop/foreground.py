@@ -662,7 +662,21 @@ class StandingCells:
 
 
 def in_a_row(flags):
-    """Which of the flags (B,) bool are set together with two on either side, as far as there are."""
+    """Which flags are set together with two on either side, as far as there are.
+
+    Parameters
+    ----------
+    flags : (B,) bool array
+
+    Returns
+    -------
+    (B,) bool array
+
+    Examples
+    --------
+    >>> in_a_row(np.array([True, True, True, False, True, False])).tolist()
+    [True, False, False, False, False, False]
+    """
     padded = np.pad(flags, 2, constant_values=True)
     return np.logical_and.reduce([padded[k : k + len(flags)] for k in range(5)])
 
