@@ -431,7 +431,8 @@ def stood_by(track, stands, now):
     for when in (since + 0.5, until):
         there = np.column_stack([np.interp(when, track.t, axis) for axis in track.positions.T])
         near &= np.linalg.norm(there - stands[:, :2], axis=1) < STANDING_REACH
-    return near & (since >= track.t[0] - 0.5) & (until <= track.t[-1] + 1.0)
+    stays = track.speeds[-1] < WALKS_ON  # who stood there when seen last does so still
+    return near & (since >= track.t[0] - 0.5) & ((until <= track.t[-1] + 1.0) | stays)
 
 
 def slides(track):
