@@ -202,7 +202,9 @@ class Observer:
         self.background, self.user, self.min_area = background, checked_user(user), min_area
         angles = checked_array("angles", angles, "B")
         if not angles.size or not (np.diff(angles) > 0).all() or np.ptp(angles) > 2 * np.pi + 1e-6:
-            raise ValueError(f"angles must increase, from one beam on, over at most a full turn, got {angles}")
+            rule = "angles must increase, from one beam on, over at most a full turn"
+            ends = f"{angles[0]:g} to {angles[-1]:g} rad" if angles.size else "none"
+            raise ValueError(f"{rule}, got {ends}")
         self._middle = (angles[0] + angles[-1]) / 2  # bearings are counted from the middle of view
         self.angles = angles - self._middle
         self.step_angle = float(np.median(np.diff(angles))) if len(angles) > 1 else np.radians(1.0)
