@@ -19,6 +19,7 @@ import scipy
 
 from dollop.checks import checked_array, put_in
 from dollop.gridmap import flat_cells
+from dollop.pose import wrapped
 
 __all__ = [
     "Environment",
@@ -110,6 +111,8 @@ class Environment:
     assumed : (N, 4) bool array, optional
         Which sides of each box, in the order of its numbers, no beam has reached: they are where
         they would be if the object were as deep as it is wide. None when not given.
+    directions : (N,) array, optional
+        Which way each object faces, in rad; nan where nothing knows. Unknown when not given.
 
     Raises
     ------
@@ -127,6 +130,7 @@ class Environment:
     boxes: np.ndarray
     seen: Seen = None
     assumed: np.ndarray = None
+    directions: np.ndarray = None
 
     def __post_init__(self):
         boxes = checked_array("boxes", self.boxes if np.size(self.boxes) else np.empty((0, 4)), "N", 4)
@@ -137,7 +141,7 @@ class Environment:
         assumed = np.zeros(boxes.shape, bool) if self.assumed is None else np.array(self.assumed, bool)
         if assumed.shape != boxes.shape:
             raise ValueError(f"assumed must hold four sides for each box, got shape {assumed.shape} for {len(boxes)}")
-        put_in(self, boxes=boxes, assumed=assumed)
+        put_in(self, boxes=boxes, assumed=assumed, directions=checked_directions(self.directions, len(boxes)))
 
     def __len__(self):
         return len(self.boxes)
@@ -161,6 +165,19 @@ class Environment:
         where = ", ".join(f"({x:.2f}, {y:.2f})" for x, y in self.centres[:6])
         more = f", ... {len(self) - 6} more" if len(self) > 6 else ""
         return f"Environment of {len(self)} objects" + (f" round {where}{more}" if len(self) else "")
+
+
+def checked_directions(directions, n):
+    """Directions of n objects (n,) in rad, nan where unknown; ValueError for what is none."""
+    if directions is None:
+        return np.full(n, np.nan)
+    try:
+        directions = np.array(directions, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"directions must be angles in rad, nan where unknown, got {directions!r:.60}") from error
+    if directions.shape != (n,) or np.isinf(directions).any():
+        raise ValueError(f"directions must hold one angle in rad for each of {n} objects, got {directions!r:.80}")
+    return np.where(np.isnan(directions), np.nan, wrapped(np.nan_to_num(directions)))
 
 
 def corner_indices(partners, turn=0.0):
