@@ -109,13 +109,25 @@ def chains_of(sequences, spread):
     points = np.concatenate(sequences)
     centre = points.mean(0)
     points = points - centre
-    return _Chains(points, centre, slices, owner, place, _prior_over(points, spread))
+    return _Chains(points, centre, slices, owner, place, prior_over(points, spread))
 
 
-def _prior_over(points, spread):
-    """Expect states of covariance spread^2, their means as wide apart as the subgoals are.
+def prior_over(points, spread):
+    """Expect states of covariance spread^2, their means as wide apart as the subgoals are (Sec. V).
 
-    No less than the spread, though.
+    No less than the spread, though (reconstruction).
+
+    Parameters
+    ----------
+    points : (M, 2) float array
+        In m, from their mean.
+    spread : float
+        Standard deviation in m.
+
+    Returns
+    -------
+    record
+        With `kappa`, `nu`, `psi` and `most`.
     """
     nu, width = 8.0, max(np.sqrt(np.mean(points**2)), spread)
     return _Prior((spread / width) ** 2, nu, (nu - 3) * spread**2, 2 * len(points))
