@@ -40,7 +40,7 @@ def _emission_gains(graph, points, prior):
 
 
 def edge_gains(into):
-    """What one more step adds to the evidence, along each edge that there is and along a new one.
+    """What one more step adds to the evidence, along each edge that there is and along a new one (Sec. V).
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def align_chain(points, graph, labels, chains):
     gain : float
         Of evidence, in nats.
     """
-    order = np.array(topological_order(graph.counts, _mean_place(labels, chains, len(graph.n))))
+    order = np.array(topological_order(graph.counts, mean_place(labels, chains, len(graph.n))))
     order = order[(graph.n[order] > 0) | (order < FIRST)]
     shared, own = _emission_gains(graph, points, chains.prior)
     shared[:, [START, END]] = -np.inf
@@ -100,7 +100,7 @@ def align_chain(points, graph, labels, chains):
 
 
 def best_alignment(shared, own, after, before, along, anew):
-    """The recursion of `align_chain` over nodes in topological order: START first, END last.
+    """The recursion of `align_chain` over nodes in topological order, START first, END last (Sec. V).
 
     An edge that there is gains more than a new one, so that of the nodes before v only the best
     needs to be known, and the edges into v.
@@ -188,16 +188,42 @@ def _aligned(k, labels, chains, graph):
     return renewed, gain
 
 
-def _mean_place(labels, chains, size):
-    """Where in their demonstrations the subgoals of each node come on average: (S,), in (0, 1)."""
+def mean_place(labels, chains, size):
+    """Where in their demonstrations the subgoals of each node come on average (Sec. V).
+
+    Parameters
+    ----------
+    labels, chains : (M,) int array and record
+    size : int
+        The number S of nodes.
+
+    Returns
+    -------
+    (S,) float array
+        Between 0, the start, and 1, the end.
+    """
     number = np.bincount(labels, minlength=size)
     place = np.bincount(labels, chains.place, size) / np.maximum(number, 1)
     place[[START, END]] = 0, 1
     return place
 
 
-def _compact(labels):
-    """The same partition, its labels numbered without gaps from FIRST."""
+def compact(labels):
+    """The same partition, its labels numbered without gaps from FIRST (Sec. V).
+
+    Parameters
+    ----------
+    labels : (M,) int array
+
+    Returns
+    -------
+    (M,) int array
+
+    Examples
+    --------
+    >>> compact(np.array([7, 9, 7, 3])).tolist()
+    [3, 4, 3, 2]
+    """
     return np.unique(labels, return_inverse=True)[1].reshape(-1) + FIRST
 
 
@@ -217,7 +243,7 @@ def _realign(labels, chains):
         renewed, after = _aligned(k, labels, chains, rest)
         idle += 1
         if after - before > LEAST_GAIN:
-            labels, idle = _compact(renewed), 0
+            labels, idle = compact(renewed), 0
             graph = graph_of(labels, chains)
         if idle == len(order):
             return labels
@@ -228,14 +254,14 @@ def _rebuild(labels, chains):
     rebuilt = np.full(len(labels), START)
     for k in _worst_explained_first(labels, chains)[::-1]:
         rebuilt, _ = _aligned(k, rebuilt, chains, graph_of(rebuilt, chains))
-    return _compact(rebuilt)
+    return compact(rebuilt)
 
 
 def _improve(labels, chains):
     """Labels that neither aligning one demonstration afresh nor merging two states can improve."""
     improved = None
     while not np.array_equal(labels, improved):
-        improved = _realign(_compact(labels), chains)
+        improved = _realign(compact(labels), chains)
         labels = merge_states(improved, chains)
     return improved
 
@@ -255,7 +281,7 @@ def estimate_structure(chains):
     (M,) int array
         Labels, numbered without gaps.
     """
-    labels = _compact(merge_states(np.arange(len(chains.points)) + FIRST, chains))
+    labels = compact(merge_states(np.arange(len(chains.points)) + FIRST, chains))
     while True:
         rebuilt = _improve(_rebuild(labels, chains), chains)
         gain = evidence_of(rebuilt, chains) - evidence_of(labels, chains)
@@ -287,7 +313,7 @@ def set_apart(labels, chains):
         if np.array_equal(strangers, apart):
             return labels
         apart = strangers
-        labels = _compact(labels + apart[chains.owner] * labels.max())
+        labels = compact(labels + apart[chains.owner] * labels.max())
 
 
 def coverage_of(states, path):
@@ -323,7 +349,7 @@ def numbered(labels, chains):
         Labels.
     """
     counts = graph_of(labels, chains).counts
-    order = topological_order(counts, _mean_place(labels, chains, len(counts)))
+    order = topological_order(counts, mean_place(labels, chains, len(counts)))
     return np.argsort(order)[labels] - 1 + FIRST  # the order begins with START and ends with END
 
 

@@ -18,7 +18,7 @@ Their evidence is, for the Normal-inverse-Wishart and for the Dirichlet of beta 
 The paper names its merge test only by reference: these formulas are a reconstruction.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -102,14 +102,60 @@ def chains_of(sequences, spread):
         With `points`, `centre`, `slices`, `owner`, `place` and `prior`.
     """
     lengths = [len(sequence) for sequence in sequences]
-    ends = np.cumsum(lengths)
-    slices = tuple(map(slice, (ends - lengths).tolist(), ends.tolist()))
-    owner = np.repeat(np.arange(len(lengths)), lengths)
+    owner, slices = np.repeat(np.arange(len(lengths)), lengths), _slices_of(lengths)
     place = np.concatenate([np.arange(1, length + 1) / (length + 1) for length in lengths])
     points = np.concatenate(sequences)
     centre = points.mean(0)
     points = points - centre
     return _Chains(points, centre, slices, owner, place, prior_over(points, spread))
+
+
+def subgoals_of(chains, chosen):
+    """Where the subgoals of some demonstrations stand among all (Sec. V).
+
+    Parameters
+    ----------
+    chains : record
+        That of `chains_of`.
+    chosen : (C,) int array
+        Numbers of demonstrations, in any order.
+
+    Returns
+    -------
+    (m,) int array
+    """
+    return np.concatenate([np.arange(chains.slices[k].start, chains.slices[k].stop) for k in chosen])
+
+
+def chains_within(chains, chosen):
+    """Some of the demonstrations as a record of their own, of the same centre and prior (Sec. V).
+
+    Parameters
+    ----------
+    chains : record
+        That of `chains_of`.
+    chosen : (C,) int array
+        Their numbers, in the order wanted.
+
+    Returns
+    -------
+    record
+        As `chains_of` makes.
+    """
+    subgoals, lengths = subgoals_of(chains, chosen), np.bincount(chains.owner)[chosen]
+    return replace(
+        chains,
+        points=chains.points[subgoals],
+        slices=_slices_of(lengths),
+        owner=np.repeat(np.arange(len(chosen)), lengths),
+        place=chains.place[subgoals],
+    )
+
+
+def _slices_of(lengths):
+    """Where things of these lengths (D,) lie, one after the other."""
+    ends = np.cumsum(lengths)
+    return tuple(map(slice, (ends - lengths).tolist(), ends.tolist()))
 
 
 def prior_over(points, spread):

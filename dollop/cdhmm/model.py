@@ -25,6 +25,7 @@ from dollop.cdhmm.evidence import (
     graph_of,
     outer_products,
 )
+from dollop.cdhmm.growing import structure_of
 from dollop.cdhmm.spread import estimate_spread
 from dollop.checks import checked_positions
 
@@ -132,7 +133,7 @@ class SubgoalHMM:
         if not LEAST_SPREAD <= spread <= MOST_SPREAD:
             raise ValueError(f"spread must lie between {LEAST_SPREAD:g} and {MOST_SPREAD:g} m, got {spread}")
         chains = chains_of(sequences, spread)
-        labels = alignment.set_apart(alignment.estimate_structure(chains), chains)
+        labels = alignment.set_apart(structure_of(chains), chains)
         labels = alignment.numbered(labels, chains)
         return cls._of(labels, chains, sequences, spread, estimated)
 

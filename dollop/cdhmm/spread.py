@@ -14,7 +14,7 @@ import numpy as np
 
 from dollop.cdhmm.evidence import emission_evidence, outer_products, prior_over
 
-__all__ = ["Expected", "by_content", "estimate_spread", "representatives"]
+__all__ = ["Expected", "by_content", "estimate_spread", "spaced"]
 
 FEW = 8  # demonstrations compared, all pairs of them: of six subgoals each they tell a spread within 8 %
 MOST_CELLS = 30_000  # pairs of subgoals compared, for time and memory; two demonstrations in any case
@@ -76,15 +76,15 @@ def by_content(sequences):
     return np.argsort(lengths, kind="stable")
 
 
-def representatives(sequences, number):
-    """Some demonstrations that stand for all: evenly spaced in their order by content.
+def spaced(total, number):
+    """Places evenly spaced among some: a cross-section of things in order (beyond the paper).
 
     Parameters
     ----------
-    sequences : sequence of (K, 2) float arrays
-        Subgoals in m.
+    total : int
+        How many there are.
     number : int
-        How many, at least one.
+        How many to take, at least one.
 
     Returns
     -------
@@ -93,11 +93,11 @@ def representatives(sequences, number):
 
     Examples
     --------
-    >>> representatives([np.array([(0, 0), (length, 0)]) for length in (5, 1, 3)], 2)
-    array([1, 0])
+    >>> spaced(9, 3), spaced(2, 3)
+    (array([1, 4, 7]), array([0, 1]))
     """
-    order = by_content(sequences)
-    return order[np.linspace(0, len(order) - 1, min(number, len(order))).round().astype(int)]
+    number = min(number, total)
+    return (2 * np.arange(number) + 1) * total // (2 * number)
 
 
 def estimate_spread(sequences, expected=None):
@@ -148,7 +148,8 @@ def _mean_gains(sequences, spreads):
         return np.zeros(len(spreads))
     longest = max(map(len, sequences))
     few = [n for n in range(2, FEW + 1) if n * (n - 1) // 2 * longest**2 <= MOST_CELLS]
-    chosen = [sequences[k] for k in representatives(sequences, max(few, default=2))]
+    order = by_content(sequences)
+    chosen = [sequences[k] for k in order[spaced(len(order), max(few, default=2))]]
     one, other = np.triu_indices(len(chosen), 1)
     lengths, merging = np.array(list(map(len, chosen))), _merging_gains(sequences, chosen, spreads)
     return _best_of_pairs(merging, lengths[one], lengths[other]).mean(1)
