@@ -40,7 +40,7 @@ def _emission_gains(graph, points, prior):
 
 
 def edge_gains(into):
-    """What one more step adds to the evidence, along each edge that there is and along a new one (Sec. V).
+    """What one more step adds to the evidence, along each edge and along a new one (Sec. V).
 
     Parameters
     ----------
@@ -100,10 +100,10 @@ def align_chain(points, graph, labels, chains):
 
 
 def best_alignment(shared, own, after, before, along, anew):
-    """The recursion of `align_chain` over nodes in topological order, START first, END last (Sec. V).
+    """The recursion of `align_chain` (Sec. V).
 
-    An edge that there is gains more than a new one, so that of the nodes before v only the best
-    needs to be known, and the edges into v.
+    Nodes are in topological order, START first, END last. An edge that there is gains more than a
+    new one, so that of the nodes before v only the best needs to be known, and the edges into v.
 
     Parameters
     ----------

@@ -124,7 +124,8 @@ def subgoals_of(chains, chosen):
     -------
     (m,) int array
     """
-    return np.concatenate([np.arange(chains.slices[k].start, chains.slices[k].stop) for k in chosen])
+    every = np.arange(len(chains.points))
+    return np.concatenate([every[chains.slices[k]] for k in chosen])
 
 
 def chains_within(chains, chosen):
@@ -267,7 +268,8 @@ def graph_of(labels, chains):
 
 def _sums(labels, values, size):
     """Sums (size, d) of the values (M, d) of each label (M,)."""
-    return np.stack([np.bincount(labels, column, size) for column in values.T], axis=-1)
+    columns = [np.bincount(labels, column, size) for column in values.T]
+    return np.stack(columns, axis=-1).astype(float)  # whole numbers where there are none
 
 
 def evidence_of(labels, chains):

@@ -1,10 +1,10 @@
-"""The structure of a CDHMM from many demonstrations: a core of them merged, the others added (Sec. V).
+"""The structure of a CDHMM from many demonstrations: a core merged, the others added (Sec. V).
 
 Best-first merging compares all pairs of subgoals, so it takes time and memory with the square of
 their number. Where there are many, only a core of the demonstrations is merged so. The others are
-aligned with its graph one after another, the best explained first. After that the states are merged
-and all demonstrations aligned afresh, in turn, until nothing gains any more. A graph has few states,
-so that every step takes as long for the thousandth demonstration as for the hundredth.
+aligned with its graph one after another, the best explained first. After that the states are
+merged and all demonstrations aligned afresh, in turn, until nothing gains any more. A graph has few
+states, so that every step takes as long for the thousandth demonstration as for the hundredth.
 """
 
 import numpy as np
@@ -55,7 +55,7 @@ class _GrowingGraph:
         self.order = np.array([v for v in order if v < FIRST or self.n[v]], int)
 
     def gain(self, k):
-        """How much evidence a demonstration that is not in the graph would add per subgoal, in nats."""
+        """What a demonstration that is not in the graph would add per subgoal, in nats."""
         part = self.chains.slices[k]
         return self._best(part)[1] / (part.stop - part.start)
 
@@ -65,7 +65,7 @@ class _GrowingGraph:
         self._put_in(part, self._best(part)[0])
 
     def align_afresh(self, k):
-        """Take a demonstration out, align it again and put it in; True if the evidence grew by that."""
+        """Take a demonstration out, align it and put it in again; True if that was of use."""
         part, order = self.chains.slices[k], self.order
         nodes = self.nodes[part].copy()
         worth = self._evidence_at(nodes)
@@ -99,7 +99,7 @@ class _GrowingGraph:
         return np.where(places < 0, -1, order[places]), gain
 
     def _put_in(self, part, nodes):
-        """Add a demonstration; its new states come right after the last one before them that it shares."""
+        """Add a demonstration; its new states come right after the last shared before them."""
         rank = np.zeros(len(self.n) + 1, int)  # the last for -1
         rank[self.order] = np.arange(len(self.order))
         own = nodes < 0
@@ -110,15 +110,15 @@ class _GrowingGraph:
         self._count(part, 1)
 
     def _count(self, part, sign):
-        """Add what a demonstration gives to the nodes it visits and to their edges, or take it away."""
-        nodes = self.nodes[part]  # none of them twice
+        """Add what a demonstration gives to its nodes and their edges, or take it away."""
+        nodes, prior = self.nodes[part], self.chains.prior  # none of the nodes twice
         self.n[nodes] += sign
         self.s[nodes] += sign * self.chains.points[part]
         self.q[nodes] += sign * self.q_points[part]
         empty = nodes[self.n[nodes] == 0]
         self.s[empty], self.q[empty] = 0.0, 0.0  # exactly
         self.into[np.append(nodes, END), np.append(START, nodes)] += sign
-        self.own[nodes] = emission_evidence(self.n[nodes], self.s[nodes], self.q[nodes], self.chains.prior)
+        self.own[nodes] = emission_evidence(self.n[nodes], self.s[nodes], self.q[nodes], prior)
 
     def _unused(self, number):
         """Nodes without subgoals; there are made more of them where there are too few."""

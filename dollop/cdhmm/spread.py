@@ -1,11 +1,11 @@
 """How far subgoals scatter, told by the demonstrations themselves (beyond the paper).
 
-The spread is a parameter like any other: what scatter makes the demonstrations most evident? Two of
-them merge as `dollop.cdhmm.alignment` aligns a chain with a graph, here with the chain of the other,
-so that for each pair and each spread the best of all alignments is found exactly. The gains of
-evidence over leaving them apart are averaged over pairs, and count once per demonstration beyond the
-first; a log-normal prior says what is usual. One demonstration, or several with nothing in common,
-say nothing, and the usual spread is left.
+The spread is a parameter like any other: what scatter makes the demonstrations most evident? Two
+of them merge as `dollop.cdhmm.alignment` aligns a chain with a graph, here with the chain of the
+other, so that for each pair and each spread the best of all alignments is found exactly. The gains
+of evidence over leaving them apart are averaged over pairs, and count once per demonstration beyond
+the first; a log-normal prior says what is usual. One demonstration, or several with nothing in
+common, say nothing, and the usual spread is left.
 """
 
 from dataclasses import dataclass, replace
@@ -16,9 +16,9 @@ from dollop.cdhmm.evidence import emission_evidence, outer_products, prior_over
 
 __all__ = ["Expected", "by_content", "estimate_spread", "spaced"]
 
-FEW = 8  # demonstrations compared, all pairs of them: of six subgoals each they tell a spread within 8 %
-MOST_CELLS = 30_000  # pairs of subgoals compared, for time and memory; two demonstrations in any case
-N_SPREADS = 12  # between the least and the most: steps of a third, of which the best is interpolated
+FEW = 8  # demonstrations compared: of six subgoals each, their pairs tell a spread within 8 %
+MOST_CELLS = 30_000  # pairs of subgoals compared, for time and memory, unless two have more
+N_SPREADS = 12  # from the least to the most in steps of a third, among which is interpolated
 PARTING = -np.log(6.0)  # nats: a step of one demonstration that leaves the chain of another
 
 
@@ -133,7 +133,7 @@ def estimate_spread(sequences, expected=None):
 
 
 def _highest(at, values):
-    """Where the values are highest, by a parabola in log(at) through the best three; at an end that."""
+    """Where the values are highest, by a parabola in log(at) through the best three."""
     best = int(np.argmax(values))
     if best in (0, len(at) - 1):
         return float(at[best])
@@ -158,7 +158,7 @@ def _mean_gains(sequences, spreads):
 def _merging_gains(sequences, chosen, spreads):
     """What each subgoal of one demonstration gains in one state with each of another: (G, P, L, L).
 
-    For P pairs of those chosen, of L subgoals at most; minus infinity beyond the end of a shorter one.
+    For P pairs of those chosen, of L subgoals at most; minus infinity beyond the end of one.
     """
     everything = np.concatenate(sequences)
     centre, longest = everything.mean(0), max(map(len, chosen))
