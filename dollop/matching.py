@@ -32,7 +32,7 @@ are (Laplace): of two objects some turn fits always, and that is no evidence.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
+from itertools import combinations, product
 from math import pi
 
 import numpy as np
@@ -47,26 +47,26 @@ __all__ = ["SURE", "Matching", "match", "match_surely"]
 SURE = 0.95
 """What is at least so probable is used without asking."""
 
-_SPREADS = np.array([0.5, 1.0, 1.5])  # times `moved`, and
-_CARRIED = np.array([0.01, 0.1])  # share of the objects that were carried off, each as likely as any
+# What nobody knows, each value as likely as any: how far objects were shifted, times `moved`, which
+# share of them was not touched at all, and which was carried off.
+_SPREADS, _STILL, _CARRIED = (0.5, 1.0, 1.5), (0.0, 0.5), (0.01, 0.1)
 _FOUND = 0.95  # of all objects that stand where it was seen; the others have gone or were missed
-_REACHED, _ASSUMED = (
-    0.035,
-    0.3,
-)  # m, standard deviation of a side that a beam reached, and of another
-_MEASURED, _MISJUDGED = 0.95, 0.05  # so often a size is off by that, and by anything
-_ANY_SIZE = 1.0  # B, 1/m^2: the sides of things differ by a metre
-_VISIBLE = np.linspace(0.525, 0.975, 10)  # p, where nobody knows what was seen
+_REACHED, _ASSUMED = 0.035, 0.3  # m, sd of a side that a beam reached, and of another
+_MEASURED, _MISJUDGED = 0.98, 0.02  # so often a size is off by that, and by anything
+_ANY_SIZE = 2.0  # B, 1/m^2: the sides of things are anything within 0.7 m
+_VISIBLE = np.sin(pi / 4 + pi / 40 * np.arange(0.5, 10)) ** 2  # p where unknown: Jeffreys, from 1/2
 _ALIKE = np.linspace(0.05, 0.95, 10)  # share of the objects that are of the size of another
-_SHIFTED, _TURNED, _ANEW = 6.0, 4.0, 0.7  # nats
+_SHIFTED, _TURNED, _ANEW = 4.0, 4.0, 1.4  # nats
+_KAPPA = 1.0  # of the turns, von Mises: small ones are a little likelier
 _NARROWEST = 5.0  # m, side of a room
 _WHERETO = np.linspace(-2, 2, 9)  # standard deviations by which an object may have been moved
 
 _EXACT = 12  # up to so many objects all matchings are summed
 _STARTS = 8  # so many of the alignments that fit best are refined, in so many steps
 _STEPS = 6
-_NEGLIGIBLE = 9.0  # nats below the best a case no longer counts
+_NEGLIGIBLE = 7.0  # nats below the best a case no longer counts
 _HOPELESS = 25.0  # nats below the best an alignment cannot count, whatever the moves
+_NEVER = 1e6  # nats
 _PROBES = 25  # by so many objects at most it is judged how well an alignment fits
 _BELIEFS = 200  # steps of belief propagation at most
 _RARE = 1e-3  # pairs less probable than this connect nothing
@@ -354,7 +354,14 @@ class _Scene:
         seen = [each.seen for each in self.environments if each.seen is not None]
         areas = [np.count_nonzero(each.floor) * each.resolution**2 for each in seen]
         spreads = [_spread(each.centres).prod() for each in self.environments]
-        return max(areas or spreads, default=0) / self.moved**2
+        return max(_NARROWEST**2, *(areas or spreads)) / self.moved**2
+
+    @cached_property
+    def blur(self):
+        """(N, M) array: variance per axis of the difference between two middles, as measured."""
+        # The middle is the mean of two sides: a quarter of their variances, that of the extent.
+        i, j = (_extents(each)[1].mean(axis=1) / (2 * self.moved) ** 2 for each in self.environments)
+        return i[:, None] + j
 
     @cached_property
     def sizes(self):
@@ -369,10 +376,14 @@ def _spread(centres):
     return np.maximum(np.ptp(centres, axis=0) * (n + 1) / max(n - 1, 1), _NARROWEST)
 
 
-def _size_ratios(*environments):
-    extents = [each.boxes[:, 2:] - each.boxes[:, :2] for each in environments]
-    sides = [np.where(each.assumed, _ASSUMED, _REACHED) ** 2 for each in environments]
-    variances = [each[:, :2] + each[:, 2:] for each in sides]
+def _extents(environment):
+    """Sizes (N, 2) in m of the boxes, and their variances in m^2."""
+    sides = np.where(environment.assumed, _ASSUMED, _REACHED) ** 2
+    return environment.boxes[:, 2:] - environment.boxes[:, :2], sides[:, :2] + sides[:, 2:]
+
+
+def _size_ratios(environment_i, environment_j):
+    extents, variances = zip(_extents(environment_i), _extents(environment_j), strict=True)
     new_i, new_j = _as_new(extents, variances)
     ratios = []
     for axes in ([0, 1], [1, 0]):
@@ -449,18 +460,30 @@ def _cases(scene, turns, shifts, priors, free):
     counts = (priors + lost_i + lost_j)[:, None] + _count_weights(n, m, i.seen is None, j.seen is None)
     others = scene.sizes[_quarters(turns)] + over_i[:, :, None] + over_j[:, None]
     squares = np.abs(scene.y - images[:, :, None]) ** 2
-    ratios, kinds = [], list(product(_SPREADS, _CARRIED))
-    for spread, carried in kinds:
-        near = np.exp(-squares / (2 * spread**2)) * scene.area / (2 * pi * spread**2)
-        ratios.append(np.log((1 - carried) * near + carried) + others)
-    # The smaller the moves, the better shift and turn are known.
-    known = [free * np.log(spread) - np.log(len(kinds)) for spread, _ in kinds]
+    near = {spread: _normal_at(squares, scene.blur + spread**2) * scene.area for spread in (0.0, *_SPREADS)}
+    ratios, known = [], []
+    for spread, still in product(_SPREADS, _STILL):
+        shifted = (1 - still) * near[spread] + still * near[0.0]
+        ratios.extend(np.log((1 - carried) * shifted + carried) + others for carried in _CARRIED)
+        # The less was moved, the better shift and turn are known.
+        room = free * np.log(np.sqrt(scene.blur.min()) if still else spread)
+        # Untouched though turned about its own middle: no frame of reference does that to a layout.
+        known.extend([np.where(still * (free == 1), -_NEVER, room)] * len(_CARRIED))
     # Where things were put up anew, nobody knows how much of that was seen.
     return _Cases(
-        np.append(1, np.tile(turns, len(kinds))),
-        np.vstack([_count_weights(n, m) - _ANEW, *(counts + each[:, None] for each in known)]),
+        np.append(1, np.tile(turns, len(known))),
+        np.vstack(
+            [
+                _count_weights(n, m) - _ANEW,
+                *(counts + each[:, None] - np.log(len(known)) for each in known),
+            ]
+        ),
         np.concatenate([scene.sizes[:1], *ratios]),
     )
+
+
+def _normal_at(squares, variances):
+    return np.exp(-squares / (2 * variances)) / (2 * pi * variances)
 
 
 def _found(environment, other, places, moved):
@@ -621,32 +644,32 @@ def _summed(cases):
     if cases.ratios.shape[2] > cases.ratios.shape[1]:
         sums, marginals = _summed(replace(cases, ratios=cases.ratios.swapaxes(1, 2)))
         return sums, marginals.swapaxes(1, 2)
-    pairs, (h, n, m) = np.exp(cases.ratios), cases.ratios.shape
-    before = np.zeros((n + 1, h, 2**m))
-    before[0, :, 0] = 1
+    pairs = np.moveaxis(np.exp(cases.ratios), 0, 2).copy()
+    n, m, h = pairs.shape
+    before = np.zeros((n + 1, 2**m, h))
+    before[0, 0] = 1
     for row in range(n):
         before[row + 1] = before[row]
         for column in range(m):
             free, taken = _by_column(before[row], column)[0], _by_column(before[row + 1], column)[1]
-            taken += pairs[:, row, column, None, None] * free
+            taken += pairs[row, column] * free
     scale = cases.counts.max(axis=1)
-    after = np.exp(cases.counts - scale[:, None])[:, _bits(m)]
+    after = np.exp(cases.counts - scale[:, None]).T[_bits(m)]
     marginals = np.empty_like(pairs)
     for row in reversed(range(n)):
         later = after.copy()
         for column in range(m):
-            taken = _by_column(later, column)[1] * pairs[:, row, column, None, None]
-            marginals[:, row, column] = (_by_column(before[row], column)[0] * taken).sum(axis=(1, 2))
+            taken = _by_column(later, column)[1] * pairs[row, column]
+            marginals[row, column] = np.einsum("abh,abh->h", _by_column(before[row], column)[0], taken)
             after_free = _by_column(after, column)[0]
             after_free += taken
-    total = after[:, 0]
-    return np.log(total) + scale, marginals / total[:, None, None]
+    return np.log(after[0]) + scale, np.moveaxis(marginals / after[0], 2, 0)
 
 
 def _by_column(sets, column):
-    """Views of (H, 2^M) values: of the sets without a column, and of the same ones with it."""
-    view = sets.reshape(len(sets), -1, 2, 2**column)
-    return view[:, :, 0], view[:, :, 1]
+    """Views of (2^M, H) values: of the sets without a column, and of the same ones with it."""
+    view = sets.reshape(-1, 2, 2**column, sets.shape[1])
+    return view[:, 0], view[:, 1]
 
 
 def _bits(m):
@@ -660,17 +683,35 @@ def _bits(m):
 def _best(cases, pairs):
     """The most probable matching (N,), its logarithmic weight (H,) in each case, and the margin."""
     steps, found = np.diff(cases.counts), [_assigned(pairs, -0.5)]
-    for row, ratios in enumerate(cases.ratios):
-        tried = steps[row] if steps.shape[1] <= _EXACT else steps[row, -1:]
-        found.extend(_assigned(ratios, step) for step in tried)
+    for ratios, step in zip(cases.ratios, steps, strict=True):
+        found.extend(_assigned(ratios, each) for each in {step[0], step[len(step) // 2], step[-1]})
     found = np.unique(found, axis=0)
-    likely = np.array([_weight(cases, partners) for partners in found])
+    likely = _likelihoods(cases, found)
+    partners = found[np.logaddexp.reduce(likely, axis=1).argmax()]
+    if len(partners) <= _EXACT:
+        found = np.unique(np.vstack([found, _neighbours(partners, cases.ratios.shape[2])]), axis=0)
+        likely = _likelihoods(cases, found)
     totals = np.logaddexp.reduce(likely, axis=1)
     best, *others = np.argsort(-totals, kind="stable")
     partners, h = found[best], likely[best].argmax()
-    last = min(max(np.count_nonzero(partners >= 0) - 1, 0), steps.shape[1] - 1)
-    held = second_best(-cases.ratios[h] - steps[h, last], partners, 0.0)
-    return partners, likely[best], float(min([held, *(totals[best] - totals[others])]))
+    margin = np.min(totals[best] - totals[others], initial=np.inf)
+    if len(partners) > _EXACT:
+        last = min(max(np.count_nonzero(partners >= 0) - 1, 0), steps.shape[1] - 1)
+        margin = min(margin, second_best(-cases.ratios[h] - steps[h, last], partners, 0.0))
+    return partners, likely[best], float(margin)
+
+
+def _neighbours(partners, m):
+    """All matchings (P, N) in which one object has no partner or a free one, or two have changed theirs."""
+    n, free = len(partners), np.setdiff1d(np.arange(m), partners)
+    others = []
+    for a, b in product(range(n), [-1, *free]):
+        others.append(partners.copy())
+        others[-1][a] = b
+    for pair in combinations(range(n), 2):
+        others.append(partners.copy())
+        others[-1][list(pair)] = partners[list(pair)][::-1]
+    return others
 
 
 def _assigned(ratios, step):
@@ -683,10 +724,11 @@ def _assigned(ratios, step):
     return partners
 
 
-def _weight(cases, partners):
-    """Logarithmic weight (H,) of one matching in each case."""
-    rows = np.flatnonzero(partners >= 0)
-    return cases.counts[:, len(rows)] + cases.ratios[:, rows, partners[rows]].sum(axis=1)
+def _likelihoods(cases, found):
+    """Logarithmic weights (P, H) of matchings (P, N) in each case."""
+    ratios = np.pad(cases.ratios, ((0, 0), (0, 0), (0, 1)))  # -1 is the last column
+    pairs = ratios[:, np.arange(found.shape[1]), found].sum(axis=2)
+    return (cases.counts[:, np.count_nonzero(found >= 0, axis=1)] + pairs).T
 
 
 # ---- crowds
