@@ -14,7 +14,7 @@ from dollop.environment import Environment
 from dollop.formats.files import FormatError, read_bytes, whole_file
 from dollop.laps import cut_laps
 from dollop.lds import LDS, Statistics
-from dollop.matching import match_confidently
+from dollop.matching import match_surely
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import check_trajectories
 
@@ -209,7 +209,7 @@ class Task:
             If the environments cannot be matched with confidence; the margin is named.
         """
         names = "the task's environment", "the new one"
-        matching = matching or match_confidently(self.environment, environment, names)
+        matching = matching or match_surely(self.environment, environment, names)[0]
         start, *subgoals = self.association.relocate(environment, matching, turned)
         law = self.law.with_subgoals(subgoals, start, turned)
         tied = self.association.carried(environment, matching)
@@ -396,7 +396,7 @@ def mapped_to(environment, demonstration, number):
         task = Task.of(demonstration)
     except ValueError as error:
         raise ValueError(f"{names[0]}: {error}") from error
-    matching = match_confidently(task.environment, environment, names)
+    matching = match_surely(task.environment, environment, names)[0]
     centres, partners = np.full((len(environment), 2), np.nan), matching.partners
     centres[partners[partners >= 0]] = task.environment.centres[partners >= 0]
     return task.adapt(environment, matching).law, centres
