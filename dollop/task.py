@@ -11,7 +11,7 @@ from dollop.checks import check_choice, put_in
 from dollop.environment import Environment
 from dollop.formats.files import whole_file
 from dollop.laps import cut_laps
-from dollop.learning.anchored import learn_anchored, tied_to_corners
+from dollop.learning.anchored import learn_anchored, tied_to_corners, told_of_places
 from dollop.learning.matchings import composed, inverse, matched_to, matchings_into, notes_of
 from dollop.learning.paper import anchors, learn_as_paper
 from dollop.learning.saving import as_dict, read_task
@@ -290,7 +290,7 @@ class Task:
             return np.nan
         else:
             way = next(each for each in self.learned if k in each.members)
-            law = way.law(way.among(shown.environment, partners))
+            law, _ = way.law(way.among(shown.environment, partners))
         return float(np.mean([law.error(walk) for walk in shown.walks]))
 
     def save(self, path):
@@ -335,11 +335,19 @@ def _laid_out(task, environment, objects, turn=0.0):
     """A task of ways that were learned, where the objects stand in an environment."""
     partners = inverse(objects, len(environment))
     placed = [way.among(environment, partners, turn) for way in task.learned]
-    laws = tuple(way.law(now) for way, now in zip(task.learned, placed, strict=True))
+    laws, kept = zip(*(way.law(now) for way, now in zip(task.learned, placed, strict=True)), strict=True)
     tied = tied_to_corners(task.learned[0], placed[0], laws[0], environment, objects)
     shown = tuple(len(way.members) for way in task.learned)
+    told = told_of_places(task.learned, kept, partners)
     return replace(
-        task, law=laws[0], environment=environment, association=tied, ways=laws, shown=shown, objects=objects
+        task,
+        law=laws[0],
+        environment=environment,
+        association=tied,
+        ways=laws,
+        shown=shown,
+        objects=objects,
+        notes=tuple(dict.fromkeys((*task.notes, *told))),
     )
 
 

@@ -15,10 +15,12 @@ from dollop.learning.paper import anchors
 from dollop.learning.way import curve_of, way_of, which_places
 from dollop.learning.ways import MISSED, divided
 
-__all__ = ["learn_anchored", "tied_to_corners"]
+__all__ = ["learn_anchored", "tied_to_corners", "told_of_places"]
 
 WHOLE = 0.05
 """Share of the way that a demonstration may lack at either end and still show all of it."""
+HANGS = 0.5
+"""Weight of what is not there from which on a place hangs on it."""
 
 
 def learn_anchored(demonstrations, partners, environment, spread=None, merged=True):
@@ -56,26 +58,32 @@ def learn_anchored(demonstrations, partners, environment, spread=None, merged=Tr
         picked = [shown[k] for k in members], [curves[k] for k in members]
         ways.append(way_of(used[members], laid, frames.of(members), home, *picked))
         notes += _told(used[members], laid)
-        for k, subgoals in zip(members, _at_home(laid, frames.of(members), home, *picked, merged), strict=True):
-            mapped[k] = subgoals
+        subgoals = _at_home(laid, frames.of(members), home, *picked, used[members]) if merged else ()
+        for k, each in zip(members, subgoals, strict=False):
+            mapped[k] = each
     notes += _told_of_ways(ways)
     model = SubgoalHMM.fit(mapped, spread) if merged else None
     return tuple(ways), model, notes
 
 
-def _at_home(laid, frames, home, shown, curves, merged):
+def _at_home(laid, frames, home, shown, curves, members):
     """The subgoals of each demonstration, mapped by what their places follow to the environment to learn in."""
-    if not merged:
-        return [None] * len(shown)
     change = laid.places.among(home)[0] - laid.places.among(frames)
     found = []
-    for row, at, each, (curve, _) in zip(change, laid.at, shown, curves, strict=True):
-        subgoals = each.law.subgoals
+    for k, row, at, each, (curve, _) in zip(members, change, laid.at, shown, curves, strict=True):
+        subgoals = _law_of(each, k).subgoals
         samples = which_places(subgoals, curve)
         places = np.interp(samples, at, np.arange(len(at)))
         moved = np.stack([np.interp(places, np.arange(len(row)), column) for column in row.T], axis=1)
         found.append(subgoals + moved)
     return found
+
+
+def _law_of(shown, k):
+    try:
+        return shown.law
+    except ValueError as error:
+        raise ValueError(f"demonstration {k}: {error}") from error
 
 
 def _told(members, laid):
@@ -133,3 +141,41 @@ def tied_to_corners(way, places, law, environment, objects):
     corners = np.tile(np.arange(4 * len(environment)), (len(points), 1))
     differences = points[:, None] - environment.corners
     return Association(environment, corners, np.repeat(np.maximum(weights, 0) / 4, 4, axis=1), differences)
+
+
+def told_of_places(ways, tolerances, partners):
+    """What is in doubt of ways in an environment (beyond the paper).
+
+    Parameters
+    ----------
+    ways : sequence of Way
+    tolerances : sequence of float
+        That their laws keep, in m.
+    partners : (N,) int array
+        For each object of the environment, which object of the ways it is; -1 for none.
+
+    Returns
+    -------
+    list of Note
+        Which stretches hang on objects that are not there, and which laws are looser than was asked.
+    """
+    notes = []
+    for number, (way, kept) in enumerate(zip(ways, tolerances, strict=True)):
+        name = f"way {number}" if len(ways) > 1 else "the way"
+        gone = (way.objects >= 0) & ~np.isin(way.objects, partners)
+        share = way.weights[:, gone].sum(axis=1) > HANGS
+        if share.any():
+            objects = np.unique(way.objects[gone & (way.weights[share] > HANGS / 2).any(axis=0)]).tolist()
+            part = _share_in_words(share)
+            text = f"{part} of {name} follows objects {objects} of those learned from, which are not matched"
+            notes.append(Note("objects", f"{text}: it is placed by what is left"))
+        if kept > way.tolerance:
+            text = f"{name} bends too sharply here for a tolerance of {way.tolerance:g} m; its law keeps {kept:g} m"
+            notes.append(Note("tolerance", text, False))
+    return notes
+
+
+def _share_in_words(places):
+    """From where to where places (L,) of a way are true."""
+    inside = 100 * np.flatnonzero(places) / (len(places) - 1)
+    return f"{inside.mean():.0f} %" if inside[0] == inside[-1] else f"from {inside[0]:.0f} to {inside[-1]:.0f} %"

@@ -19,6 +19,8 @@ from dollop.trajectory import align, arc_length, resample
 
 __all__ = ["Way", "curve_of", "way_of", "which_places"]
 
+LOOSER = 4
+"""Times that the tolerance of a law is doubled where objects bend its way too sharply."""
 SLOWER, FASTER = 0.2, 5.0
 """Most that a step of a walk may be shortened or stretched and still take the time that its new length takes."""
 
@@ -134,9 +136,25 @@ class Way:
 
         Returns
         -------
-        SequencedLDS
+        law : SequencedLDS
+        tolerance : float
+            That it keeps, in m: larger than the way's where it bends too sharply for that, as the
+            walks that were shown do not.
+
+        Raises
+        ------
+        ValueError
+            Where the walks that were shown cannot be segmented at their tolerance.
         """
-        return SequencedLDS.fit(self.walked(now), self.tolerance, sample_period=self.sample_period)
+        walks, tolerance = self.walked(now), self.tolerance
+        for _ in range(LOOSER):
+            try:
+                return SequencedLDS.fit(walks, tolerance, sample_period=self.sample_period), tolerance
+            except ValueError:
+                if walks[0] is self.walks[0] and len(self.members) == 1:
+                    raise
+                tolerance *= 2
+        return SequencedLDS.fit(walks, tolerance, sample_period=self.sample_period), tolerance
 
 
 def _at_shown_speed(before, after):
