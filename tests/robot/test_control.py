@@ -46,11 +46,11 @@ def random_law(seed):
     return SequencedLDS(tuple(segments), start, speeds)
 
 
-def straight_law(*goals, speed=0.3):
+def straight_law(*goals, speed=0.3, start=(0.0, 0.0)):
     """One LDS per goal that heads straight for it from anywhere."""
     still = Statistics(np.eye(2), 0.9 * np.eye(2))
     segments = tuple(LDS(still, goal) for goal in goals)
-    return SequencedLDS(segments, np.zeros(2), np.full(len(goals), speed))
+    return SequencedLDS(segments, np.array(start), np.full(len(goals), speed))
 
 
 def trap():
@@ -189,7 +189,7 @@ def test_commands_are_the_formulas(error):
     """Plain: s cos e and 3 e; pursuit: the circle through the point ahead; sharp: turn first."""
     pose = (1.0, 2.0, np.arctan2(2, 4) - error)
     commands = {
-        name: kind(Guidance(straight_law((5, 4))), [0.3], Unicycle(pose)).command(*pose)
+        name: kind(Guidance(straight_law((5, 4), start=pose[:2])), [0.3], Unicycle(pose)).command(*pose)
         for name, kind in CONTROL_LAWS.items()
     }
     turn = np.clip(3 * error, -0.8, 0.8)
