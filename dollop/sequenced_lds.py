@@ -27,6 +27,8 @@ from dollop.trajectory import (
 __all__ = ["SequencedLDS"]
 
 LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none would ever arrive
+REACH = 0.01  # m, to which lines are rolled out
+ROUNDS = 8  # how often a walk is divided anew: nearly always two are enough
 MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
 
 
@@ -132,12 +134,11 @@ class SequencedLDS:
         statistics = retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
         errors = segment_errors(path, statistics)
         pauses = shown_pauses(stands, shares[:, ::2], arc_length(path)[-1])
-        cuts = cut_at_pauses(errors, tolerance, n_segments, pauses)
-        spans = zip(cuts[:-1], np.diff(cuts), path[cuts[1:]], strict=True)
-        segments = tuple(LDS(statistics(start, length), goal) for start, length, goal in spans)
+        division = Division(path, statistics, errors, pauses)
+        cuts = division.exactly(n_segments) if n_segments is not None else division.within(tolerance)
         at = moments[:, cuts]
-        law = cls(segments, path[0], demonstrated_speeds(walks, at, sample_period))
-        return law.with_timing(walks, at, sample_period, pauses_at(pauses, cuts), shown_corners(path, cuts))
+        law = cls(division.segments(cuts), path[0], demonstrated_speeds(walks, at, sample_period))
+        return law.with_timing(walks, at, sample_period, *division.stops(cuts))
 
     def with_timing(self, walks, moments, sample_period, pauses, corners):
         """The same law with the timing and the corners of what it was fitted to.
@@ -153,13 +154,12 @@ class SequencedLDS:
         pauses : (K + 1,) float array
             s.
         corners : (K,) bool array
-            Shown anyway; where somebody stood there is one, too.
+            Whether one was shown.
 
         Returns
         -------
         SequencedLDS
         """
-        corners = corners | (pauses[1:] > 0)
         law = replace(self, pauses=pauses, corners=corners)
         lengths = np.array([line.way[-1] for line in law.lines()])
         return replace(law, profile=shown_profile(walks, moments, lengths, sample_period))
@@ -181,7 +181,7 @@ class SequencedLDS:
         corners = np.zeros(len(self.segments), bool) if self.corners is None else self.corners
         return lines_of(self.segments, self.start, corners, reach)
 
-    def response(self, start=None, reach=0.01, method="held"):
+    def response(self, start=None, reach=0.01, method="held", segment=0):
         """Follow the segments, handing over to the next within reach of each subgoal (Sec. III).
 
         Since every LDS is stable, this happens after finitely many steps from any start. The next
@@ -198,6 +198,8 @@ class SequencedLDS:
             within decimetres, so that after a push the way is soon the shown one again; far from it
             the LDS is alone; through a subgoal the direction is continuous (beyond the paper, as
             stable: see `dollop.law.line`). "paper": every LDS alone.
+        segment : int
+            The first in force.
 
         Returns
         -------
@@ -207,7 +209,7 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            A start that is no position, too small a reach, or another method.
+            A start that is no position, too small a reach, another method or segment.
 
         Examples
         --------
@@ -224,20 +226,21 @@ class SequencedLDS:
         >>> bool(np.abs(np.hypot(*pushed[len(pushed) // 2 :].T) - 1).max() < 0.01)
         True
         """
-        return np.vstack(self.responses(start, reach, method))
+        return np.vstack(self.responses(start, reach, method, segment))
 
-    def responses(self, start=None, reach=0.01, method="held"):
+    def responses(self, start=None, reach=0.01, method="held", segment=0):
         """The response, segment by segment.
 
         Parameters
         ----------
-        start, reach, method
-            See `response`.
+        start, reach, method, segment
+            See `response`; by default the start is where the segment sets out.
 
         Returns
         -------
-        list of K (M_k, 2) float arrays
-            m; the first place of each follows on the last of the one before. One may be empty.
+        list of (M_k, 2) float arrays
+            Of each segment from the first in force on, m; the first place of each follows on the
+            last of the one before. One may be empty.
 
         Raises
         ------
@@ -257,26 +260,31 @@ class SequencedLDS:
         if not reach >= LEAST_REACH:
             raise ValueError(f"reach must be at least {LEAST_REACH:g} m, got {reach}")
         check_choice("method", method, ("held", "paper"))
-        place = checked_array("start", self.start if start is None else start, 2)
-        return (self._held if method == "held" else self._alone)(place, reach)
+        if segment not in range(len(self.segments)):
+            raise ValueError(f"segment must be 0 to {len(self.segments) - 1}, got {segment}")
+        if start is None:
+            start = np.vstack([self.start, self.subgoals])[segment]
+        place = checked_array("start", start, 2)
+        parts = (self._held if method == "held" else self._alone)(place, reach, segment)
+        return [part[1:] if k else part for k, part in enumerate(parts)]
 
-    def _held(self, place, reach):
+    def _held(self, place, reach, segment):
         """The response from a place (2,) that comes back to the line of each segment."""
-        parts = []
-        for k, line in enumerate(self.lines(reach)):
+        lines, parts = self.lines(reach)[segment:], []
+        for k, line in enumerate(lines):
             places, offsets = line.follow(place, 0 if k else line.nearest(place), reach)
-            parts.append((places + offsets)[min(k, 1) :])
-            place = places[-1] + offsets[-1]
+            parts.append(places + offsets)
+            place = parts[-1][-1]
         return parts
 
-    def _alone(self, place, reach):
+    def _alone(self, place, reach, segment):
         """The response from a place (2,) of every LDS alone."""
         parts = []
-        for k, segment in enumerate(self.segments):
+        for each in self.segments[segment:]:
             states = [place]
-            while np.linalg.norm(states[-1] - segment.goal) > reach:
-                states.append(segment.step(states[-1]))
-            parts.append(np.array(states)[min(k, 1) :])
+            while np.linalg.norm(states[-1] - each.goal) > reach:
+                states.append(each.step(states[-1]))
+            parts.append(np.array(states))
             place = states[-1]
         return parts
 
@@ -436,32 +444,89 @@ def check_search(tolerance, n_segments, sample_period, candidates):
         raise ValueError(f"{rule}, got {n_segments}")
 
 
-def cut_at_pauses(errors, tolerance, n_segments, pauses):
-    """Cuts of the division as asked for, of which some are where the walks stood.
+@dataclass(frozen=True, eq=False)
+class Division:
+    """What is needed to divide a walk into segments.
 
-    The longest pauses have the say where not all of them leave room for the segments.
+    Attributes
+    ----------
+    path : (C, 2) float array
+        The walks' mean at the candidate cuts, m.
+    statistics : callable
+        (start, length) -> Statistics.
+    errors : (C, C) float array
+        From `segment_errors`, m.
+    pauses : dict of int to float
+        Seconds stood, by candidate cut.
     """
-    inner = [cut for cut in pauses if 2 <= cut <= len(errors) - 3]
-    required = sorted(inner, key=pauses.get)
-    if n_segments is not None:
+
+    path: np.ndarray
+    statistics: object
+    errors: np.ndarray
+    pauses: dict
+
+    def within(self, tolerance):
+        """Cuts (S + 1,) of the fewest segments within a tolerance in m, as they are and rounded.
+
+        A segment whose line, rounded as its neighbours want it, leaves the path by more is refused,
+        and so are those like it, and the walk is divided anew. Where that never ends, the division
+        with the least excess is taken.
+        """
+        errors, tried = self._cut(self.errors, list(self.pauses)), []
+        while len(tried) < ROUNDS:
+            try:
+                cuts = fewest_segments(errors, tolerance)
+            except ValueError:
+                if not tried:
+                    raise
+                break
+            beside = self.line_errors(cuts)
+            tried.append((beside.max(), cuts))
+            if beside.max() <= tolerance:
+                break
+            for k in np.flatnonzero(beside > tolerance):
+                rows, columns = (slice(max(each - 1, 0), each + 2) for each in cuts[k : k + 2])
+                errors[rows, columns] = np.inf
+        return min(tried, key=lambda each: each[0])[1]
+
+    def exactly(self, n_segments):
+        """Cuts (S + 1,) of so many segments with the least total error.
+
+        The longest pauses have the say where not all of them leave room for the segments.
+        """
+        required = sorted(self.pauses, key=self.pauses.get)
         required = required[max(len(required) - n_segments + 1, 0) :]
-    while True:
+        while True:
+            cuts = best_segments(self._cut(self.errors, required), n_segments)
+            if cuts is not None or not required:
+                return cuts
+            required = required[1:]
+
+    def _cut(self, errors, required):
+        """Errors (C, C) of the segments that have none of some cuts within; both ends count for it."""
         kept = errors.copy()
         for cut in required:
-            kept[:cut, cut + 1 :] = np.inf
-        exactly = n_segments is not None
-        cuts = best_segments(kept, n_segments) if exactly else fewest_segments(kept, tolerance)
-        if cuts is not None or not required:
-            return cuts
-        required = required[1:]
+            if 2 <= cut <= len(errors) - 3:
+                kept[:cut, cut + 1 :] = np.inf
+        return kept
 
+    def segments(self, cuts):
+        """The LDS of each segment, for cuts (S + 1,)."""
+        spans = zip(cuts[:-1], np.diff(cuts), self.path[cuts[1:]], strict=True)
+        return tuple(LDS(self.statistics(start, length), goal) for start, length, goal in spans)
 
-def pauses_at(pauses, cuts):
-    """Seconds (S + 1,) stood at each cut: of pauses by candidate cut, each at the cut next to it."""
-    seconds = np.zeros(len(cuts))
-    for cut, pause in pauses.items():
-        seconds[np.abs(cuts - cut).argmin()] += pause
-    return seconds
+    def stops(self, cuts):
+        """Seconds stood at each cut (S + 1,), and whether there is a corner or a stop at each end (S,)."""
+        seconds = np.zeros(len(cuts))
+        for cut, pause in self.pauses.items():
+            seconds[np.abs(cuts - cut).argmin()] += pause
+        return seconds, shown_corners(self.path, cuts) | (seconds[1:] > 0)
+
+    def line_errors(self, cuts):
+        """Mean distances (S,) in m of the path between the cuts (S + 1,) from the lines of the law."""
+        lines = lines_of(self.segments(cuts), self.path[0], self.stops(cuts)[1], REACH)
+        spans = zip(cuts[:-1], cuts[1:], lines, strict=True)
+        return np.array([distance_to_polyline(self.path[i + 1 : j], line.places).mean() for i, j, line in spans])
 
 
 def cut_moments(walks, shares):

@@ -32,7 +32,7 @@ import numpy as np
 from dollop.lds import powers_on
 from dollop.trajectory import arc_length, at_arc_length
 
-__all__ = ["FADE", "Line", "lines_of"]
+__all__ = ["FADE", "Fading", "Line", "lines_of"]
 
 FADE = 0.15
 """m of way over which an offset from the line fades to 1/e: about the distance between the wheels and
@@ -41,6 +41,7 @@ push at one object would not be over at the next."""
 
 PARTS = 64  # of a segment's way, no place being farther from the next: 4 cm of 3 m
 ROUNDED = 0.4  # share of a segment's way at each of its ends where the line is rounded
+CURLED = 0.25  # share of it in which a response curls into its subgoal, or from the one before
 AROUND = 0.04  # share of the way over which the direction is measured where the rounding begins
 BULGE = 1 + 2**0.5  # the least curvature, in 1 / length, that turns an end by 1 rad and comes back
 
@@ -186,14 +187,26 @@ class Fading:
         self.at = at
 
     def offset(self, i):
-        """The offset (x, y) in m at place i, not before an earlier one; beyond the last, at rest."""
+        """The offset at a place of the line.
+
+        Parameters
+        ----------
+        i : int
+            Index of the place, not before that of an earlier call; beyond the last, so many steps
+            at the subgoal.
+
+        Returns
+        -------
+        (float, float)
+            In m.
+        """
         last = len(self.steps) - 1
         step, way = self.steps[min(i, last)] + max(i - last, 0), self.ways[min(i, last)]
         while step > self.whole[0] + 1:
-            self.whole = self.moved(1.0, self.way_at(self.whole[0] + 1))
-        return self.moved(step - self.whole[0], way)[2:]
+            self.whole = self._moved(1.0, self._way_at(self.whole[0] + 1))
+        return self._moved(step - self.whole[0], way)[2:]
 
-    def way_at(self, step):
+    def _way_at(self, step):
         """The way in m to a step, not before an earlier one."""
         while self.at < len(self.steps) - 1 and self.steps[self.at] < step:
             self.at += 1
@@ -202,7 +215,7 @@ class Fading:
         share = min((step - self.steps[before]) / taken, 1.0) if taken else 1.0
         return self.ways[before] + share * (self.ways[after] - self.ways[before])
 
-    def moved(self, share, way):
+    def _moved(self, share, way):
         """Step, way in m and offset after a share of a step that leads on to so much way."""
         step, begun, x, y = self.whole
         (a, b, c, d), held = self.matrix, exp(-(x * x + y * y) / self.near**2)
@@ -287,7 +300,7 @@ def rounded(before, after):
     if first is None or second is None:
         return before, after
     (one, bend), (other, bend_after) = (each.end for each in (first, second))
-    weights = np.array([1 / first.length, 1 / second.length])
+    weights = np.array([1 / first.reach, 1 / second.reach])
     turn = (bend_after - bend) / BULGE + weights[0] * one - weights[1] * other
     direction = turn / weights.sum()
     places = first.places(direction), second.places(-direction)[::-1]
@@ -314,7 +327,7 @@ class Half:
     def of(cls, line):
         """The half of a line; None where it is too short to have a direction."""
         length = arc_length(line)[-1]
-        at = length * (1 - ROUNDED + AROUND * np.array([-1.0, 0.0, 1.0]))
+        at = length * (1 - CURLED + AROUND * np.array([-1.0, 0.0, 1.0]))
         if not length > 0:
             return None
         tail, place, head = at_arc_length(line, at)
@@ -329,6 +342,11 @@ class Half:
         return float(np.hypot(*(self.line[-1] - self.place)))
 
     @property
+    def reach(self):
+        """Way in m over which the end is turned."""
+        return ROUNDED * float(arc_length(self.line)[-1])
+
+    @property
     def end(self):
         """The direction (2,) in which the parabola comes to the subgoal, and its bend (2,), 1/m."""
         bend = 2 * ((self.line[-1] - self.place) / self.length - self.direction) / self.length
@@ -337,12 +355,10 @@ class Half:
     def places(self, direction):
         """The line (V, 2), rounded so that it comes to the subgoal in a direction (2,)."""
         way, (end, bend) = arc_length(self.line), self.end
-        left = (way[-1] - way) / (ROUNDED * way[-1])
-        rows = left < 1
-        u = left[rows, None]
-        t = self.length * (1 - u)
+        left = (way[-1] - way)[:, None] / way[-1]
+        t = self.length * (1 - left / CURLED)
+        parabola = self.place + t * self.direction + t**2 * bend / 2
+        u = np.minimum(left / ROUNDED, 1)
         bulge = np.where(u < 0.5**0.5, u - BULGE / 2 * u**2, BULGE / 2 * (1 - u) ** 2)
-        places = self.line.copy()
-        places[rows] = self.place + t * self.direction + t**2 * bend / 2
-        places[rows] -= self.length * bulge * (direction - end)
-        return places
+        turned = ROUNDED * way[-1] * bulge * (direction - end)
+        return np.where(left < CURLED, parabola, self.line) - turned
