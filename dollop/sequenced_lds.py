@@ -6,7 +6,7 @@ import numpy as np
 
 from dollop.checks import check_choice, check_positive, checked_array
 from dollop.law.line import lines_of
-from dollop.law.timing import Stands, shown_corners, shown_pauses, shown_profile, times_along
+from dollop.law.timing import CORNER, Stands, shown_pauses, shown_profile, times_along, turns_at
 from dollop.lds import LDS
 from dollop.segmentation import (
     best_segments,
@@ -28,6 +28,7 @@ __all__ = ["SequencedLDS"]
 
 LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none would ever arrive
 REACH = 0.01  # m, to which lines are rolled out
+TURNED = np.radians(10)  # over two decimetres: on a radius of 1.1 m, which is no corner
 ROUNDS = 8  # how often a walk is divided anew: nearly always two are enough
 MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
 
@@ -468,9 +469,10 @@ class Division:
     def within(self, tolerance):
         """Cuts (S + 1,) of the fewest segments within a tolerance in m, as they are and rounded.
 
-        A segment whose line, rounded as its neighbours want it, leaves the path by more is refused,
-        and so are those like it, and the walk is divided anew. Where that never ends, the division
-        with the least excess is taken.
+        Where the segments' lines, rounded as they are where they meet, leave the path by more on
+        the mean, those that do are refused, and so is one that turns at its end by 10 degrees more
+        than the path; with them those like them. Then the walk is divided anew. Where that never
+        ends, the division with the least excess is taken.
         """
         errors, tried = self._cut(self.errors, list(self.pauses)), []
         while len(tried) < ROUNDS:
@@ -480,11 +482,11 @@ class Division:
                 if not tried:
                     raise
                 break
-            beside = self.line_errors(cuts)
-            tried.append((beside.max(), cuts))
-            if beside.max() <= tolerance:
+            excess = self.excess(cuts, tolerance)
+            tried.append((excess.max(), cuts))
+            if excess.max() <= 1:
                 break
-            for k in np.flatnonzero(beside > tolerance):
+            for k in np.flatnonzero(excess > 1):
                 rows, columns = (slice(max(each - 1, 0), each + 2) for each in cuts[k : k + 2])
                 errors[rows, columns] = np.inf
         return min(tried, key=lambda each: each[0])[1]
@@ -520,13 +522,28 @@ class Division:
         seconds = np.zeros(len(cuts))
         for cut, pause in self.pauses.items():
             seconds[np.abs(cuts - cut).argmin()] += pause
-        return seconds, shown_corners(self.path, cuts) | (seconds[1:] > 0)
+        return seconds, (self.turns(cuts) > CORNER) | (seconds[1:] > 0)
 
-    def line_errors(self, cuts):
-        """Mean distances (S,) in m of the path between the cuts (S + 1,) from the lines of the law."""
-        lines = lines_of(self.segments(cuts), self.path[0], self.stops(cuts)[1], REACH)
+    def turns(self, cuts):
+        """How far (S,) in rad the path turns at the end of each segment, for cuts (S + 1,)."""
+        return turns_at(self.path, arc_length(self.path)[cuts[1:]])
+
+    def excess(self, cuts, tolerance):
+        """How far (S,) each segment's rounded line is beside the path, and turns at its end too far.
+
+        In units of the tolerance in m and of 10 degrees, the larger of both. While the mean over
+        the whole path is within the tolerance, no segment is beside it too far.
+        """
+        corners = self.stops(cuts)[1]
+        lines = lines_of(self.segments(cuts), self.path[0], corners, REACH)
         spans = zip(cuts[:-1], cuts[1:], lines, strict=True)
-        return np.array([distance_to_polyline(self.path[i + 1 : j], line.places).mean() for i, j, line in spans])
+        beside = [distance_to_polyline(self.path[i + 1 : j], line.places) for i, j, line in spans]
+        total = np.concatenate(beside).mean() / tolerance
+        each = np.array(list(map(np.mean, beside))) / tolerance
+        whole = np.vstack([line.places for line in lines])
+        turns = turns_at(whole, np.cumsum([line.way[-1] for line in lines]))
+        turned = np.where(corners, 0, turns - self.turns(cuts)) / TURNED
+        return np.maximum(np.where(total > 1, each, np.minimum(each, 1)), turned)
 
 
 def cut_moments(walks, shares):

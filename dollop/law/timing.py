@@ -7,7 +7,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from dollop.trajectory import arc_length, at_arc_length
 
-__all__ = ["PARTS", "Stands", "shown_corners", "shown_pauses", "shown_profile", "times_along"]
+__all__ = ["CORNER", "PARTS", "Stands", "shown_pauses", "shown_profile", "times_along", "turns_at"]
 
 STILL, LEAST = 0.05, 1.0
 """Who stays within so many metres of a place for so many seconds stands there."""
@@ -143,32 +143,30 @@ def _grouped(found, apart):
     return groups
 
 
-def shown_corners(path, cuts):
-    """Whether a path has a corner at its cuts.
+def turns_at(path, ways):
+    """How far a path turns between a decimetre before and behind.
 
     Parameters
     ----------
-    path : (C, 2) float array
-        Places at which it may be cut, m.
-    cuts : (S + 1,) int array
-        Where it is.
+    path : (N, 2) float array
+        m.
+    ways : (S,) float array
+        Where along it, m.
 
     Returns
     -------
-    (S,) bool array
-        For the end of each segment; nothing is known of the last.
+    (S,) float array
+        From 0 to pi, rad; 0 at the ends of the path.
 
     Examples
     --------
-    >>> path = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [2.0, 2.0]])
-    >>> shown_corners(path, np.array([0, 2, 4])), shown_corners(path[:3], np.array([0, 1, 2]))
-    (array([ True, False]), array([False, False]))
+    >>> path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    >>> np.degrees(turns_at(path, np.array([0.5, 1.0, 2.0]))).round()
+    array([ 0., 90.,  0.])
     """
-    way = arc_length(path)
-    places = [at_arc_length(path, way[cuts[1:]] + shift) for shift in (-OVER, 0.0, OVER)]
-    arriving, going_on = (np.diff(places, axis=0)) @ (1, 1j)
-    turns = np.abs(np.angle(going_on * arriving.conj()))
-    return (turns > CORNER) & (cuts[1:] < cuts[-1])
+    places = [at_arc_length(path, ways + shift) for shift in (-OVER, 0.0, OVER)]
+    arriving, going_on = np.diff(places, axis=0) @ (1, 1j)
+    return np.abs(np.angle(going_on * arriving.conj()))
 
 
 def shown_profile(walks, moments, lengths, period):
