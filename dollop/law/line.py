@@ -12,12 +12,16 @@ decays by a rate of its own instead, e' = B e with
 
 d being half the segment's way; far from the line w is 0, and the LDS is alone.
 
-Theorem. Whatever the data, no offset grows, and every segment hands over after finitely many steps
-from any start. Proof. In the Lyapunov norm |e|^2_V = e^T G0^-1 e of the segment, |A e| <= q |e| with
-q < 1 (see `LDS.lyapunov`; G0 is regular), so |B e| <= (1 - w) q |e| + w c |e| <= max(q, c) |e|, for
-any w from 0 to 1. Meanwhile n goes up by one with every step, whatever e is: r[n] comes to g, since A
-is stable, and e to 0, since c <= |a| < 1, a being the segment's decay. The same holds between two
-steps, where e is a mean of e and B e, and for any other line in the place of r that ends in g.
+Theorem. Whatever the data, no step lets the offset grow, and every segment hands over after finitely
+many of them, from any start. Proof. In the segment's Lyapunov norm |e|_V^2 = e^T G0^-1 e there is a
+q < 1 such that |A e|_V <= q |e|_V (see `LDS.lyapunov`; G0 is regular). So for any w from 0 to 1
+
+    |B e|_V <= (1 - w) q |e|_V + w c |e|_V <= max(q, c) |e|_V.
+
+Meanwhile n goes up by one with every step, whatever e is: r[n] comes to g, since A is stable, and e
+to 0, since c <= |a| < 1, a being the segment's decay. Between two steps, where e is a mean of e and
+B e, it is no larger than at the first. Nothing of this hangs on r being the response: any line that
+ends in g will do.
 
 That last is made use of: where two segments meet, the line is rounded, so that its direction is
 continuous. It still passes every subgoal.
@@ -40,8 +44,7 @@ the centre of a robot, which turns on the spot. In less the way back would be a 
 push at one object would not be over at the next."""
 
 PARTS = 64  # of a segment's way, no place being farther from the next: 4 cm of 3 m
-ROUNDED = 0.4  # share of a segment's way at each of its ends where the line is rounded
-CURLED = 0.25  # share of it in which a response curls into its subgoal, or from the one before
+ROUNDED = 1 / 3  # of a segment's way at each of its ends, where the line is rounded
 AROUND = 0.04  # share of the way over which the direction is measured where the rounding begins
 BULGE = 1 + 2**0.5  # the least curvature, in 1 / length, that turns an end by 1 rad and comes back
 
@@ -300,7 +303,7 @@ def rounded(before, after):
     if first is None or second is None:
         return before, after
     (one, bend), (other, bend_after) = (each.end for each in (first, second))
-    weights = np.array([1 / first.reach, 1 / second.reach])
+    weights = np.array([1 / first.length, 1 / second.length])
     turn = (bend_after - bend) / BULGE + weights[0] * one - weights[1] * other
     direction = turn / weights.sum()
     places = first.places(direction), second.places(-direction)[::-1]
@@ -327,7 +330,7 @@ class Half:
     def of(cls, line):
         """The half of a line; None where it is too short to have a direction."""
         length = arc_length(line)[-1]
-        at = length * (1 - CURLED + AROUND * np.array([-1.0, 0.0, 1.0]))
+        at = length * (1 - ROUNDED + AROUND * np.array([-1.0, 0.0, 1.0]))
         if not length > 0:
             return None
         tail, place, head = at_arc_length(line, at)
@@ -342,11 +345,6 @@ class Half:
         return float(np.hypot(*(self.line[-1] - self.place)))
 
     @property
-    def reach(self):
-        """Way in m over which the end is turned."""
-        return ROUNDED * float(arc_length(self.line)[-1])
-
-    @property
     def end(self):
         """The direction (2,) in which the parabola comes to the subgoal, and its bend (2,), 1/m."""
         bend = 2 * ((self.line[-1] - self.place) / self.length - self.direction) / self.length
@@ -355,10 +353,12 @@ class Half:
     def places(self, direction):
         """The line (V, 2), rounded so that it comes to the subgoal in a direction (2,)."""
         way, (end, bend) = arc_length(self.line), self.end
-        left = (way[-1] - way)[:, None] / way[-1]
-        t = self.length * (1 - left / CURLED)
-        parabola = self.place + t * self.direction + t**2 * bend / 2
-        u = np.minimum(left / ROUNDED, 1)
+        left = (way[-1] - way) / (ROUNDED * way[-1])
+        rows = left < 1
+        u = left[rows, None]
+        t = self.length * (1 - u)
         bulge = np.where(u < 0.5**0.5, u - BULGE / 2 * u**2, BULGE / 2 * (1 - u) ** 2)
-        turned = ROUNDED * way[-1] * bulge * (direction - end)
-        return np.where(left < CURLED, parabola, self.line) - turned
+        places = self.line.copy()
+        places[rows] = self.place + t * self.direction + t**2 * bend / 2
+        places[rows] -= self.length * bulge * (direction - end)
+        return places

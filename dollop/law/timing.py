@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from dollop.trajectory import arc_length, at_arc_length
 
@@ -87,11 +87,13 @@ def _still(walk, period):
     radius = min(STILL, SLOW * speed * LEAST)
     if width > len(walk):
         return []
-    window = {"size": width, "axis": 0, "mode": "nearest"}
-    extent = maximum_filter1d(walk, **window) - minimum_filter1d(walk, **window)
-    centre = (extent <= 2 * radius).all(axis=1)
-    centre[: width // 2] = centre[len(walk) - (width - 1) // 2 :] = False  # no whole window
-    still = maximum_filter1d(centre.astype(np.int8), width, mode="constant", origin=-1 if width % 2 == 0 else 0)
+    # Who walks 2 r evenly scatters by r / sqrt(3) about the middle, whichever way he walks.
+    centred = walk - walk.mean(axis=0)
+    first, second = (uniform_filter1d(each, width, axis=0) for each in (centred, centred**2))
+    middle = (second - first**2).sum(axis=1) <= radius**2 / 3
+    middle[: width // 2] = middle[len(walk) - (width - 1) // 2 :] = False  # no whole window
+    origin = -1 if width % 2 == 0 else 0
+    still = maximum_filter1d(middle.astype(np.int8), width, mode="constant", origin=origin)
     edges = np.flatnonzero(np.diff(still, prepend=0, append=0))
     return list(zip(edges[::2], edges[1::2] - 1, strict=True))
 
@@ -99,7 +101,7 @@ def _still(walk, period):
 def _narrowed(walk, first, last):
     """The span without the steps before and behind: within the radius of the place itself."""
     samples = walk[first : last + 1]
-    near = np.flatnonzero(np.hypot(*(samples - np.median(samples, axis=0)).T) <= STILL)
+    near = np.flatnonzero(np.hypot(*(samples - samples.mean(axis=0)).T) <= STILL)
     return (first + near[0], first + near[-1]) if len(near) else (first, first)
 
 
@@ -166,7 +168,8 @@ def turns_at(path, ways):
     """
     places = [at_arc_length(path, ways + shift) for shift in (-OVER, 0.0, OVER)]
     arriving, going_on = np.diff(places, axis=0) @ (1, 1j)
-    return np.abs(np.angle(going_on * arriving.conj()))
+    inner = np.minimum(np.abs(arriving), np.abs(going_on)) > 1e-6  # at an end rounding has the say
+    return np.where(inner, np.abs(np.angle(going_on * arriving.conj())), 0.0)
 
 
 def shown_profile(walks, moments, lengths, period):

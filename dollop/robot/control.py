@@ -405,8 +405,10 @@ class Supervisor:
 
     def waits(self):
         """Whether the robot is to stand still in this period, because the demonstrator did."""
+        if self.waiting < self.period / 2:
+            return False
         self.waiting -= self.period
-        return self.waiting > -self.period / 2
+        return True
 
     def shown_speeds(self, k, places):
         """Speeds (N,) in m/s shown at places (N, 2) of segment k, within what the robot can."""
