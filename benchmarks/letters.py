@@ -1,10 +1,10 @@
 """How well a law follows letters and shapes in space and time: python -m benchmarks.letters [first last]
 
 Every demonstration is scaled so that the diagonal of its bounding box is 3 m, and lasts as long as its samples say,
-0.1 s each. A law with the default tolerance and a DMP (movement_primitives, 50 weights per dimension) learn from that one
-demonstration. The letters G, S, Z were written by others (folder `letters` in DOLLOP_EXTERNAL_DATA); the shapes are our
-own: arc, line, angle, spiral, J, sine, loop, turned, drawn by a hand that slows down in bends, sways by a few
-millimetres and rests at both ends, from a seed each.
+0.1 s each. A law with the default tolerance and a DMP (movement_primitives, 50 weights per dimension) learn from that
+one demonstration. The letters G, S, Z were written by others (folder `letters` in DOLLOP_EXTERNAL_DATA); the shapes are
+our own: arc, line, angle, spiral, J, sine, loop, turned, drawn by a hand that slows down in bends, sways by a few
+millimetres and starts and stops softly, from the seeds first to last - 1.
 
 All errors in % of the 3 m:
 
