@@ -286,9 +286,12 @@ def drive(keeper, robot, kidnap, timeout, localise_within):
         x, y, theta = pose = robot.pose
         touching = getattr(robot, "touching", None)
         true_pose = getattr(robot, "true_pose", pose)
+        finite = isfinite(x + y + theta)
+        if robot.localised and finite:
+            keeper.begin(x, y)
         state = keeper.active, keeper.way, robot.localised, touching, keeper.known
         records.append((pose, true_pose, *state))
-        if not isfinite(x + y + theta):
+        if not finite:
             return records, f"the pose must be finite, got {x, y, theta} at {now:.1f} s"
         if robot.localised:
             blind, command = 0.0, keeper.command(x, y, theta)

@@ -314,8 +314,6 @@ class WayKeeper:
         -------
         (float, float)
         """
-        if not self.begun:
-            self.begin(x, y)
         self.notice(x, y)
         if len(self.ways) > 1 and self.out_of_patience(x, y):
             self.leave(x, y, theta, longest=0.0)
@@ -325,7 +323,7 @@ class WayKeeper:
         return command
 
     def begin(self, x, y):
-        """Put the way in force that fits a start and is free.
+        """Put the way in force that fits the start and is free, once.
 
         A robot at the start of a way takes one that starts there; elsewhere one on which it stands.
 
@@ -334,6 +332,8 @@ class WayKeeper:
         x, y : float
             In m.
         """
+        if self.begun:
+            return
         self.begun = True
         from_starts = [float(np.hypot(*(way.law.start - [x, y]))) for way in self.ways]
         misfits = from_starts
