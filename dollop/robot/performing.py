@@ -251,7 +251,8 @@ def ways_of(task, only=False):
     laws = tuple(getattr(task, "ways", (task.law,)))
     shown = tuple(getattr(task, "shown", (1,) * len(laws)))
     if not 0 < len(laws) == len(shown):
-        raise ValueError(f"a task must have a way, and shown must count each, got {len(laws)} ways and {shown}")
+        got = f"got {len(laws)} ways and {shown}"
+        raise ValueError(f"a task must have a way, and shown must count each, {got}")
     return laws, shown
 
 

@@ -1,18 +1,21 @@
 """Which way of a task a robot drives, and when it changes to another (beyond the paper).
 
-A task that was shown in several ways has a law for each. What a way is like among obstacles is found by rolling
-its response out twice, with obstacles and without. It is *free* where the one keeps near the other,
+A task that was shown in several ways has a law for each. What a way is like among obstacles is
+found by rolling its response out twice, with obstacles and without. It is *free* where the one
+keeps near the other,
 
     max_p min_q |p - q| <= 2 r + d    in every segment, p on the one, q on the other,
 
-with r the robot's radius and d the distance within which obstacles turn it: so far aside it may be led by a thing
-no wider than itself. What leads it farther off is no thing to go round, but closes the way.
+with r the robot's radius and d the distance within which obstacles turn it: so far aside it may be
+led by a thing no wider than itself. What leads it farther off is no thing to go round, but closes
+the way.
 
-The way in force is blocked where the robot makes no progress, or where a new obstacle closes it. Then it changes to
-another way that is free, at the nearest place by driving that lies no farther along than the robot has come.
+The way in force is blocked where the robot makes no progress, or where a new obstacle closes it.
+Then it changes to another way that is free, at the nearest place by driving that lies no farther
+along than the robot has come.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, cos, inf, isfinite, sin
 
@@ -44,7 +47,7 @@ class Way:
 
     @cached_property
     def _response(self):
-        """Places (M, 2) in m on the response from the way's own start, 5 cm apart, and segments (M,)."""
+        """Places (M, 2) in m on the response from the way's start, 5 cm apart; segments (M,)."""
         return tuple(map(np.array, Guidance(self.law).way(0, *self.law.start.tolist())))
 
     @property
@@ -108,8 +111,9 @@ def extra_length(way, obstacles, k, x, y):
     Returns
     -------
     float
-        In m. 0 where the way is free: where it is led aside nowhere by more than what a thing as wide as the robot
-        needs. `inf` where it does not get through, or where a subgoal is off the map or in an obstacle.
+        In m. 0 where the way is free: where it is led aside nowhere by more than what a thing as
+        wide as the robot needs. `inf` where it does not get through, or where a subgoal is off the
+        map or in an obstacle.
 
     Examples
     --------
@@ -119,10 +123,10 @@ def extra_length(way, obstacles, k, x, y):
     >>> from dollop.robot.avoidance import ObstacleMap
     >>> from dollop.sequenced_lds import SequencedLDS
     >>> way = Way(0, SequencedLDS.fit(np.linspace([0.0, 0.0], [6.0, 0.0], 50)))
-    >>> stool, wall = [[2.8, -0.2, 3.2, 0.1]], [[2.8, -3.0, 3.2, 3.0]]
-    >>> extra_length(way, ObstacleMap.of(Environment(stool), places=[[0, 0], [6, 0]]), 0, 0.0, 0.0)
-    0.0
-    >>> extra_length(way, ObstacleMap.of(Environment(wall), places=[[0, 0], [6, 0]]), 0, 0.0, 0.0) > 1
+    >>> for box in ([2.8, -0.2, 3.2, 0.1], [2.8, -3.0, 3.2, 3.0]):
+    ...     obstacles = ObstacleMap.of(Environment([box]), places=[[0, 0], [6, 0]])
+    ...     print(extra_length(way, obstacles, 0, 0.0, 0.0) > 0)
+    False
     True
     """
     if obstacles is None:
@@ -148,15 +152,15 @@ def _can_be(obstacles, x, y):
 
 
 def _astray(leg, own, obstacles):
-    """Whether places (N, 2) are led farther from a way's own (M, 2) than what a thing as wide as the robot needs."""
+    """Whether places (N, 2) are led farther from a way's own (M, 2) than round what is gone round."""
     return distance_to_polyline(leg, own).max() > 2 * obstacles.radius + INFLUENCE
 
 
 def counterpart(way, other, at):
     """The place of another way that is as far along as a place of this one (reconstruction).
 
-    What both have in common at the beginning and at the end counts by length, what lies between by its share: two
-    ways round a table have come equally far half-way round it.
+    What both have in common at the beginning and at the end counts by length, what lies between by
+    its share: two ways round a table have come equally far half-way round it.
 
     Parameters
     ----------
@@ -181,7 +185,8 @@ def counterpart(way, other, at):
     near_other = distance_to_polyline(other.places, way.places) <= REACH
     size, size_other = len(near), len(near_other)
     before = min(_run_of_true(near), _run_of_true(near_other))
-    after = min(_run_of_true(near[::-1]), _run_of_true(near_other[::-1]), min(size, size_other) - before)
+    after = min(_run_of_true(near[::-1]), _run_of_true(near_other[::-1]))
+    after = min(after, size - before, size_other - before)
     if at < before:
         return at
     if at >= size - after:
@@ -197,7 +202,7 @@ def _run_of_true(flags):
 
 @dataclass(frozen=True)
 class _Option:
-    """A way that could be driven from a segment on: how much longer obstacles make it, how far off it is, in m."""
+    """A way to be driven from a segment on: how much longer it gets, how far off it is, in m."""
 
     way: Way
     segment: int
@@ -211,14 +216,14 @@ def fitting(options):
     Parameters
     ----------
     options : sequence
-        Each with `extra` (m, how much longer obstacles make it), `misfit` (m, how far the robot is off it) and
-        `way`, a `Way`.
+        Each with `extra` (m, how much longer obstacles make it), `misfit` (m, how far the robot is
+        off it) and `way`, a `Way`.
 
     Returns
     -------
     object
-        One of the options. A free one before one that is closed; of these the one that fits best, of those that
-        fit as well within 0.25 m the one shown most often.
+        One of the options. A free one before one that is closed; of these the one that fits best,
+        of those that fit as well within 0.25 m the one shown most often.
     """
     least = min(each.extra for each in options)
     options = [each for each in options if each.extra == least]
@@ -250,7 +255,7 @@ class WayKeeper:
         What is known to stand there.
     way : int
         Index of the way in force.
-    blocked : dict of int to (float, float)
+    left : dict of int to (float, float)
         The ways that the robot has left because it made no progress, and where in m.
     supervisor : Supervisor
         Of the way in force.
@@ -259,14 +264,25 @@ class WayKeeper:
     def __init__(self, laws, shown, robot, control, chart, avoid=True):
         self.ways = [Way(i, law, n) for i, (law, n) in enumerate(zip(laws, shown, strict=True))]
         self.robot, self.control, self.chart, self.avoid = robot, control, chart, avoid
-        self.noticed, self.felt, self.blocked = np.empty((0, 4)), np.empty((0, 4)), {}
+        self.noticed, self.felt, self.left = np.empty((0, 4)), np.empty((0, 4)), {}
         self.begun = len(self.ways) == 1
         self.remap()
         self.enter(self.ways[0], 0)
 
-    active = property(lambda self: self.supervisor.active, doc="The segment in force, of the way in force.")
-    done = property(lambda self: self.supervisor.done, doc="Whether the last segment has handed over.")
-    hopeless = property(lambda self: self.supervisor.hopeless, doc="Whether there is no progress on any way.")
+    @property
+    def active(self):
+        """Int: the segment in force, of the way in force."""
+        return self.supervisor.active
+
+    @property
+    def done(self):
+        """Bool: whether the last segment of the way in force has handed over."""
+        return self.supervisor.done
+
+    @property
+    def hopeless(self):
+        """Bool: whether there is no progress, and no other way to change to."""
+        return self.supervisor.hopeless
 
     @property
     def reason(self):
@@ -279,9 +295,9 @@ class WayKeeper:
 
     def _tell(self, way):
         """What is the matter with a way that is not in force."""
-        if way not in self.blocked:
+        if way not in self.left:
             return f"way {way} is closed"
-        return "way {} was left at ({:.2f}, {:.2f})".format(way, *self.blocked[way])
+        return "way {} was left at ({:.2f}, {:.2f})".format(way, *self.left[way])
 
     def remap(self):
         """Map what is known to stand there, and what the robot has felt."""
@@ -335,13 +351,15 @@ class WayKeeper:
         if self.begun:
             return
         self.begun = True
+        self._has_noticed()
         from_starts = [float(np.hypot(*(way.law.start - [x, y]))) for way in self.ways]
         misfits = from_starts
         if min(from_starts) > REACH:
             misfits = [float(distance_to_polyline([[x, y]], way.places)[0]) for way in self.ways]
         last = [way.segments.searchsorted(1) - 1 for way in self.ways]
         options = self.options(self.ways, last, x, y)
-        options = [_Option(each.way, 0, each.extra, off) for each, off in zip(options, misfits, strict=True)]
+        pairs = zip(options, misfits, strict=True)
+        options = [replace(each, segment=0, misfit=off) for each, off in pairs]
         self.enter(fitting(options).way, 0)
 
     def options(self, ways, last, x, y):
@@ -389,7 +407,7 @@ class WayKeeper:
         """
         here = self.ways[self.way]
         at = here.nearest(self.active, x, y)
-        ways = [way for way in self.ways if way.index != self.way and way.index not in self.blocked]
+        ways = [way for way in self.ways if way.index != self.way and way.index not in self.left]
         return self.options(ways, [counterpart(here, way, at) for way in ways], x, y)
 
     def notice(self, x, y):
@@ -400,19 +418,24 @@ class WayKeeper:
         x, y : float
             Where the robot is, in m.
         """
-        noticed = getattr(self.robot, "noticed", None)
-        if noticed is None or np.array_equal(noticed.boxes, self.noticed):
-            return
-        self.noticed = noticed.boxes
-        self.remap()
-        if self.obstacles is None:
+        if not self._has_noticed() or self.obstacles is None:
             return
         here = self.ways[self.way]
-        stay = _Option(here, self.active, extra_length(here, self.obstacles, self.active, x, y), 0.0)
+        extra = extra_length(here, self.obstacles, self.active, x, y)
+        stay = _Option(here, self.active, extra, 0.0)
         others = self.others(x, y) if stay.extra > 0 and len(self.ways) > 1 else []
         best = min([stay, *others], key=lambda each: each.extra)
         best = fitting([each for each in others if each.extra == 0] or [best])
         self.enter(best.way, best.segment)
+
+    def _has_noticed(self):
+        """Whether the robot has noticed something new, which is then mapped."""
+        noticed = getattr(self.robot, "noticed", None)
+        if noticed is None or np.array_equal(noticed.boxes, self.noticed):
+            return False
+        self.noticed = noticed.boxes
+        self.remap()
+        return True
 
     def out_of_patience(self, x, y):
         """Whether there has been no progress for so long that the way counts as blocked.
@@ -438,7 +461,8 @@ class WayKeeper:
     def leave(self, x, y, theta, longest):
         """Change to another way, if obstacles make one longer by no more than some length.
 
-        What stands in the way, though the map does not tell, is taken to be as wide as what closes a way.
+        What stands in the way, though the map does not tell, is taken to be as wide as what closes
+        a way.
 
         Parameters
         ----------
@@ -454,11 +478,12 @@ class WayKeeper:
         """
         felt, self.felt = self.felt, np.vstack([self.felt, self._ahead(x, y, theta)])
         self.remap()
-        options = [each for each in self.others(x, y) if each.extra <= longest and isfinite(each.extra)]
+        others = filter(lambda each: isfinite(each.extra), self.others(x, y))
+        options = [each for each in others if each.extra <= longest]
         if not options:
             self.felt = felt
             return False
-        self.blocked[self.way] = x, y
+        self.left[self.way] = x, y
         best = fitting(options)
         self.enter(best.way, best.segment)
         return True

@@ -152,6 +152,12 @@ def test_the_papers_kind_has_one_way():
     assert np.abs(run.poses[:, 1]).max() < 0.2
 
 
+def test_what_it_notices_at_once_counts_at_the_start():
+    """Boxes that it sees from its start are as good as those on its map: it never begins the usual way."""
+    run = perform(task(), Noticing(START, (-1.0, CLOSING)))
+    assert run.finished and (run.way == 1).all() and run.clearance.min() > 0
+
+
 # ---- on the way
 
 
