@@ -21,7 +21,7 @@ STOOL = [1.3, 0.05, 1.6, 0.35]
 
 def walk(*points):
     """A law of straight lines through points, in order."""
-    return SequencedLDS.fit(resample(points, 300), tolerance=0.05)
+    return SequencedLDS.fit(resample(points, 150), tolerance=0.05)
 
 
 BETWEEN = walk((0, 0), (6, 0))
@@ -138,6 +138,13 @@ def test_starts_within_reach_of_each_other_are_one():
     assert (perform(task(ways=ways), Unicycle((0.0, 0.4, 0.0))).way == 1).all()
 
 
+def test_beginning_comes_before_standing_on_a_way():
+    """Where one way begins, in the middle of another that was shown more often, the one that begins is taken."""
+    ways = walk((-2, 0), (6, 0)), ROUND
+    run = perform(task(ways=ways), Unicycle(START))
+    assert run.finished and (run.way == 1).all()
+
+
 def test_a_lost_robot_chooses_when_it_knows_where_it_is():
     """Until then the usual way is in force, which is not that of its start."""
     ways = walk((0, 0), (6, 0)), walk((0, 3), (4.4, 2.6), (6, 0))
@@ -163,11 +170,11 @@ def test_what_it_notices_at_once_counts_at_the_start():
 
 @pytest.mark.parametrize("control", ["plain", "pursuit"])
 def test_a_box_that_is_noticed_makes_it_change(control):
-    """Two metres on its way, it goes back to where the other way parts, and skips none of its subgoals."""
-    run = perform(task(), Noticing(START, (5.0, CLOSING)), control)
+    """Almost two metres on, it goes back to where the other way parts, and skips none of its subgoals."""
+    run = perform(task(), Noticing(START, (4.5, CLOSING)), control)
     assert run.finished and run.collisions == 0 and run.clearance.min() > 0
     changed = np.flatnonzero(np.diff(run.way))
-    assert len(changed) == 1 and run.t[changed[0]] == pytest.approx(5.0, abs=0.2)
+    assert len(changed) == 1 and run.t[changed[0]] == pytest.approx(4.5, abs=0.2)
     assert f"on way 0, from {run.t[changed[0] + 1]:.1f} s on way 1: finished" in repr(run)
     other = run.poses[run.way == 1, :2]
     for goal in ROUND.subgoals[run.active[changed[0] + 1] :]:
@@ -191,6 +198,32 @@ def test_without_progress_it_changes():
     assert len(changed) == 1 and run.t[changed[0]] - run.t[halted] == pytest.approx(8.0, abs=1.0)
 
 
+def test_no_part_is_skipped_that_was_not_done():
+    """The other way comes by where the robot turns, but only later: it joins before that, at its first corner."""
+    ways = BETWEEN, walk((0, 0), (0, -2.5), (1.8, -2.5), (1.8, 2.6), (4.4, 2.6), (6, 0))
+    run = perform(task(ways=ways), Noticing(START, (4.5, CLOSING)))
+    assert run.finished and run.way[-1] == 1
+    turned = run.poses[run.way == 1, :2]
+    assert np.hypot(*(turned[0] - [1.8, 0.0])) < 0.3 and np.hypot(*(turned - [1.8, -2.5]).T).min() < 0.5
+
+
+def test_what_halts_it_halts_it_on_ways_through_the_same_gap_too():
+    """Halted in a gap, it does not try a second way through it, 0.3 m beside the first, but the third round it."""
+    tables = [[2.7, 1.1, 3.3, 1.9], [2.7, -5.0, 3.3, -1.1]]
+    ways = BETWEEN, walk((0, 0), (1.5, 0.3), (4.5, 0.3), (6, 0)), ROUND
+    wide = SimpleNamespace(law=BETWEEN, ways=ways, shown=(3, 2, 1), environment=Environment(tables))
+    run = perform(wide, Stopped(START, [2.7, -1.0, 3.3, 1.0]))
+    assert run.finished and set(run.way) == {0, 2}
+
+
+def test_a_detour_that_the_map_asks_for_comes_first():
+    """Before a stool in the middle of its way the plain law comes to a halt; a detour round it keeps to the way."""
+    stool = SimpleNamespace(**vars(task()) | {"environment": Environment([[2.6, -0.2, 2.8, 0.2]])})
+    run = perform(stool, Unicycle((0.0, 0.0, 0.0)), "plain")
+    halted = np.count_nonzero(np.hypot(*np.diff(run.poses[:, :2], axis=0).T) < 0.001) * 0.1
+    assert run.finished and not run.way.any() and halted > 4
+
+
 def test_kidnapped_it_keeps_its_way():
     """Put beside the other way, it goes on to the subgoal of the usual one."""
     run = perform(task(), Unicycle(START), kidnap=[(4.0, (2.0, 2.6, 0.0))])
@@ -207,7 +240,7 @@ def test_a_single_way_is_driven_by_detours():
     runs = [perform(each, Unicycle(START)) for each in (one, plain)]
     np.testing.assert_array_equal(runs[0].poses, runs[1].poses)
     assert runs[0].finished and runs[0].clearance.min() > 0
-    noticed = perform(task(ways=(BETWEEN,), shown=(3,)), Noticing(START, (5.0, CLOSING)))
+    noticed = perform(task(ways=(BETWEEN,), shown=(3,)), Noticing(START, (2.5, CLOSING)))
     assert noticed.finished and noticed.clearance.min() > 0
 
 
@@ -220,7 +253,7 @@ def test_where_all_ways_are_closed_a_detour_is_driven():
     assert (run.way == 0).all()
 
 
-@pytest.mark.parametrize("found", [(), ((5.0, [2.9, -4.0, 3.1, 4.0]),)], ids=["known", "noticed"])
+@pytest.mark.parametrize("found", [(), ((2.5, [2.9, -4.0, 3.1, 4.0]),)], ids=["known", "noticed"])
 def test_where_no_way_leads_through_it_gives_up_and_names_all(found):
     """Behind a wall without an opening, or with one that is closed while it drives."""
     background = walled((-0.7, 0.7), (2.0, 3.6)) if found else walled()
@@ -232,7 +265,7 @@ def test_where_no_way_leads_through_it_gives_up_and_names_all(found):
 
 def test_held_fast_it_tries_every_way_and_names_all():
     """With its wheels in the air, it tries the other way, and tells where it left the first."""
-    held = Unicycle(START)
+    held = Unicycle(START, period=0.4)
     held.drive = lambda speed, turn: None
     run = perform(task(), held)
     assert run.way[-1] == 1 and "of way 1 (way 0 was left at (0.00, 0.00)) at " in run.reason
@@ -254,9 +287,10 @@ def test_a_way_is_free_or_longer_or_closed():
 def test_ways_have_come_equally_far():
     """Along what they share by length, between by share, never back, and from end to end."""
     one, other = Way(0, BETWEEN), Way(1, ROUND)
-    there = [counterpart(one, other, at) for at in range(len(one.places))]
-    assert (np.diff(there) >= 0).all() and there[0] == 0 and there[-1] == len(other.places) - 1
-    assert there[15] == 15 and abs(there[len(there) // 2] - len(other.places) / 2) < 15
+    end, end_other = len(one.places) - 1, len(other.places) - 1
+    there = [counterpart(one, other, at) for at in (0, 15, end // 4, end // 2, 3 * end // 4, end)]
+    assert (np.diff(there) > 0).all() and there[:2] == [0, 15] and there[-1] == end_other
+    assert abs(there[3] - end_other / 2) < 15
 
 
 @pytest.mark.parametrize(
