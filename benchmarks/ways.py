@@ -41,6 +41,7 @@ FIRST, COUNT = 0, 20
 SIDE, WALL = 0.05, 0.1  # m: of a cell, and how thick the walls are
 RADIUS, ROOM, SLIT = 0.25, 0.1, 0.45  # m: of the robot, beside a walk, and the widest slit that is left
 NOTICED, STOPPED = 2.5, 0.05  # m: from where boxes are noticed, and where the robot halts
+SPREAD = 0.2  # m: how far from where the user did the robot starts at most, along x and along y
 WAYS = ("usual", "other")
 KINDS = [(kind, "pursuit") for kind in ("known", "noticed", "stopped", "law alone", "stool")]
 KINDS += [(kind, "plain") for kind in ("known", "noticed", "stopped", "stool")]
@@ -215,7 +216,7 @@ class Stopped(Unicycle):
 
 def pose_near(rng, start):
     """Within some 0.1 m of a start, in any direction."""
-    return (*(start + rng.normal(0, 0.1, 2).clip(-0.2, 0.2)), rng.uniform(-np.pi, np.pi))
+    return (*(start + rng.normal(0, 0.1, 2).clip(-SPREAD, SPREAD)), rng.uniform(-np.pi, np.pi))
 
 
 def stool_on(layout, rng):
@@ -224,8 +225,9 @@ def stool_on(layout, rng):
     for _ in range(200):
         size, centre = rng.uniform(0.2, 2 * RADIUS, 2), rng.permutation(layout.walks[0])[0] + rng.normal(0, 0.1, 2)
         free = obstacles.edge(*centre) + RADIUS - np.hypot(*size) / 2 > 2 * RADIUS + 2 * ROOM
-        ends = [*layout.walks[0][[0, -1]], *law.subgoals]
-        if free and all((np.abs(end - centre) > size / 2 + RADIUS + ROOM).any() for end in ends):
+        away = np.abs(np.array([layout.walks[0][0], *law.subgoals]) - centre) - size / 2 - RADIUS - ROOM
+        away[0] -= SPREAD  # the robot does not start in contact
+        if free and (away > 0).any(axis=1).all():
             return replace(layout, closing=np.hstack([centre - size / 2, centre + size / 2])[None])
     return None
 
