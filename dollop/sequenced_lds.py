@@ -6,7 +6,7 @@ import numpy as np
 
 from dollop.checks import check_positive, checked_array
 from dollop.lds import LDS
-from dollop.segmentation import best_segments, fewest_segments, raw_statistics, retimed_statistics, segment_errors
+from dollop.segmentation import best_segments, fewest_cuts, raw_statistics, retimed_statistics, segment_errors
 from dollop.trajectory import align, arc_length, check_trajectories, check_trajectory, distance_to_polyline, resample
 
 __all__ = ["SequencedLDS"]
@@ -93,9 +93,10 @@ class SequencedLDS:
         aligned, shares = align(walks, 2 * candidates - 1)
         path, moments = aligned.mean(axis=0)[::2], cut_moments(walks, shares[:, ::2])
         statistics = retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
-        errors = segment_errors(path, statistics)
-        exactly = n_segments is not None
-        cuts = best_segments(errors, n_segments) if exactly else fewest_segments(errors, tolerance)
+        if n_segments is None:
+            cuts = fewest_cuts(path, statistics, tolerance)
+        else:
+            cuts = best_segments(segment_errors(path, statistics), n_segments)
         spans = zip(cuts[:-1], np.diff(cuts), path[cuts[1:]], strict=True)
         segments = tuple(LDS(statistics(start, length), goal) for start, length, goal in spans)
         return cls(segments, path[0], demonstrated_speeds(walks, moments[:, cuts], sample_period))

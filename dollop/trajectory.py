@@ -8,6 +8,7 @@ import numpy as np
 
 from dollop.checks import checked_positions
 
+_AT_ONCE = 1 << 14  # pairs of a point and an edge measured at once: they stay in a processor's cache
 _ROUNDS = 3  # how often walks are laid onto their mean: then it hardly changes any more
 
 
@@ -229,11 +230,33 @@ def distance_to_polyline(points, polyline):
     """
     points, polyline = np.asarray(points, float), np.asarray(polyline, float)
     edges = np.diff(polyline, axis=0) if len(polyline) > 1 else np.zeros_like(polyline)
-    starts = polyline[: len(edges)]
+    return _distance_to_edges(points, polyline[: len(edges)], edges)
+
+
+def _distance_to_edges(points, starts, edges):
+    """Distances (N,) in m of points (N, d) to the nearest of edges, starts (M, d) and along (M, d).
+
+    Many are divided: the points on either side, each with those edges that can be nearest to one of
+    them, which is judged by the distance to the middle of a circle round them.
+    """
+    if len(points) == 1 or len(points) * len(edges) <= _AT_ONCE:
+        return _to_each_edge(points, starts, edges).min(axis=1)
+    nearest, widest = np.empty(len(points)), np.ptp(points, axis=0).argmax()
+    for some in np.array_split(np.argpartition(points[:, widest], len(points) // 2), 2):
+        middle = (points[some].min(axis=0) + points[some].max(axis=0)) / 2
+        radius = np.linalg.norm(points[some] - middle, axis=1).max()
+        apart = _to_each_edge(middle[None], starts, edges)[0]
+        near = ~(apart > (1 + 1e-9) * (apart.min() + 2 * radius))
+        nearest[some] = _distance_to_edges(points[some], starts[near], edges[near])
+    return nearest
+
+
+def _to_each_edge(points, starts, edges):
+    """Distances (N, M) in m of points (N, d) to edges, see `_distance_to_edges`."""
     squared = np.maximum((edges**2).sum(axis=1), np.finfo(float).tiny)
     offsets = points[:, None] - starts
     along = np.clip((offsets * edges).sum(axis=2) / squared, 0, 1)
-    return np.sqrt(((offsets - along[..., None] * edges) ** 2).sum(axis=2).min(axis=1))
+    return np.sqrt(((offsets - along[..., None] * edges) ** 2).sum(axis=2))
 
 
 def align(trajectories, n=200):
@@ -308,7 +331,7 @@ def _monotone_warp(reference, walks):
     penalty = (step[:, None] * (np.arange(5) - 2)) ** 2  # five moves: 0 to 4 fine steps
     best = np.full((len(walks), fine + 4), np.inf)
     best[:, 4] = 0.0
-    moves = np.empty((n, len(walks), fine), int)
+    moves = np.empty((n, len(walks), fine), np.int8)
     for i in range(1, n):
         reach = np.stack([best[:, 4 - m :][:, :fine] + penalty[:, m, None] for m in range(5)])
         moves[i] = reach.argmin(axis=0)

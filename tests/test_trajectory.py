@@ -60,6 +60,16 @@ def test_distance_to_polyline_agrees_with_a_plain_loop():
     assert np.allclose(distance_to_polyline(points, polyline), plain)
 
 
+@pytest.mark.parametrize("smooth", [True, False])
+def test_many_distances_are_those_of_one_point_at_a_time(smooth):
+    """What is divided because it is much is as exact as what is not, for walks and for scattered points."""
+    points, polyline = np.random.default_rng(4).normal(size=(2, 500, 2))
+    if smooth:
+        points, polyline = points.cumsum(axis=0), polyline.cumsum(axis=0)
+    alone = [distance_to_polyline(point[None], polyline)[0] for point in points]
+    assert distance_to_polyline(points, polyline).tolist() == alone
+
+
 def test_distance_to_a_single_point():
     """A polyline of one vertex is a point."""
     assert distance_to_polyline([[3.0, 4.0]], [[0.0, 0.0]]) == pytest.approx(5)
