@@ -7,7 +7,15 @@ import numpy as np
 from dollop.checks import check_positive, checked_array
 from dollop.lds import LDS
 from dollop.segmentation import best_segments, fewest_cuts, raw_statistics, retimed_statistics, segment_errors
-from dollop.trajectory import align, arc_length, check_trajectories, check_trajectory, distance_to_polyline, resample
+from dollop.trajectory import (
+    align,
+    arc_length,
+    check_one_way,
+    check_trajectories,
+    check_trajectory,
+    distance_to_polyline,
+    resample,
+)
 
 __all__ = ["SequencedLDS"]
 
@@ -57,7 +65,7 @@ class SequencedLDS:
         Parameters
         ----------
         trajectories : (N, 2) array_like or sequence of (N_k, 2) array_like
-            Positions in m; several must start and end at corresponding places.
+            Positions in m; several must be walks of one way (`dollop.trajectory.ways_apart`).
         tolerance : float
             Largest mean error of a segment in m.
         n_segments : int, optional
@@ -78,8 +86,8 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            Trajectories as in `LDS.fit`, a parameter out of its range, or a tolerance that no
-            division keeps.
+            Trajectories as in `LDS.fit`, walks that are not of one way, a parameter out of its
+            range, or a tolerance that no division keeps.
 
         Examples
         --------
@@ -91,6 +99,7 @@ class SequencedLDS:
         check_search(tolerance, n_segments, sample_period, candidates)
         walks = check_trajectories(trajectories)
         aligned, shares = align(walks, 2 * candidates - 1)
+        check_one_way(walks, aligned)
         path, moments = aligned.mean(axis=0)[::2], cut_moments(walks, shares[:, ::2])
         statistics = retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
         if n_segments is None:
