@@ -28,7 +28,7 @@ __all__ = [
 HORIZON, SETTLED = 48, 4.0
 """The search follows a response over this many points, over this many time constants."""
 
-AT_ONCE = 384  # segments looked at together: what is held of them stays in a processor's cache
+AT_ONCE = 320  # segments looked at together: what is held of them stays in a processor's cache
 FIRST_LOOK = 4  # cuts within a segment
 ROUNDING = 1e-9  # share of a sum that its order may change
 EVEN = 1e-8  # m per squared cut: of equal errors the more even division, not as rounding has it
@@ -64,13 +64,21 @@ def retimed_statistics(aligned):
     low, share = retimed_places(aligned.shape[1] // 2 + 1)
 
     def statistics(start, length):
-        rows, between = 2 * np.asarray(start)[..., None] + low[length], share[length]
-        pairs = zip(columns, steps, strict=True)
-        samples = (walk.take(rows, 1) + between * step.take(rows, 1) for walk, step in pairs)
+        rows = low.take(length, axis=0) + 2 * np.asarray(start)[..., None]
+        between = share.take(length, axis=0)
+        samples = (along_edges(*each, rows, between) for each in zip(columns, steps, strict=True))
         first, *others = map(componentwise_statistics, samples)
         return sum(others, first)
 
     return statistics
+
+
+def along_edges(starts, edges, which, share):
+    """Places (d, ...) a share of the way along those edges (d, N) that are named."""
+    places = edges.take(which, axis=1)
+    places *= share
+    places += starts.take(which, axis=1)
+    return places
 
 
 @lru_cache(maxsize=4)

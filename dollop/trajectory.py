@@ -10,9 +10,9 @@ import scipy
 from dollop.checks import checked_positions
 
 _AT_ONCE = 1 << 14  # pairs of a point and an edge measured at once: they stay in a processor's cache
-_FAR, _NEAR = 0.2, 0.1  # of the walks' size: apart that far another way; never another way if nearer
+_FAR, _NEAR = 0.2, 0.15  # of the walks' size: farther is another way, nearer is not (letters of one kind: 0.14)
 _STRAY = 1.0  # m, twice as far as walked subgoals scatter: another way, if the others keep together
-_TOGETHER = 3.0  # others keep together if this many times as close; in 600 sets of one way 2.8 at most
+_TOGETHER = 3.0  # others keep together if this many times as close (sets of one way: 2.8 in 600)
 _NAMED = 5  # more walks are counted, not named
 _ROUNDS = 3  # how often walks are laid onto their mean: then it hardly changes any more
 
@@ -352,7 +352,7 @@ def chained(apart, size, least=0.0):
 
     Beyond the paper. Close is within a fifth of the walks' size, which mirrored, reversed and
     truncated walks, other shapes and most detours are not. Where three or more are there to compare,
-    a gap above a tenth of the size, or above 1 m, is too wide as well if it is three times the one
+    a gap above 0.15 of the size, or above 1 m, is too wide as well if it is three times the one
     that half of the walks keep. Two walks that differ by less than a fifth of their size cannot be
     told from one that sways.
 
@@ -390,7 +390,7 @@ def chained(apart, size, least=0.0):
     return np.argsort(order)[label], allowed
 
 
-def ways_apart(trajectories, n=100):
+def ways_apart(trajectories, n=50):
     """Walks sorted by the way they take, any two laid onto each other and compared (see `chained`).
 
     Parameters
@@ -455,6 +455,8 @@ def check_one_way(trajectories, aligned):
     Traceback (most recent call last):
     ValueError: trajectories must be walks of one way, got trajectory 1 ... m away from trajectories 0, 2; ...
     """
+    if len(aligned) == 1:
+        return
     apart = np.array([np.linalg.norm(aligned - walk, axis=2).max(axis=1) for walk in aligned])
     if not chained(apart, _size(aligned), _step(aligned))[0].any():
         return
