@@ -106,7 +106,7 @@ def size_of(way):
 
 
 def other_way(task, rng):
-    """The same task done in another way: same beginning and end, between them beside other objects or on other sides."""
+    """The same task in another way: same beginning and end, between them beside other objects or on other sides."""
     offsets, objects = task.offsets.copy(), task.objects.copy()
     middle = np.arange(1, len(objects) - 1)
     changed = rng.choice(middle, max(1, len(middle) - int(rng.integers(0, 2))), replace=False)
