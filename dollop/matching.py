@@ -24,7 +24,8 @@ seen, p is the same for all, and unknown. A matching of k pairs then has the pro
 where w_k = (N + M - k - 1)! counts in how many ways K may be made of them. Z is the sum over all
 partial matchings: row by row over sets of columns, exactly, up to twelve objects; by belief
 propagation for more. What nobody knows is summed over as well: sigma, half, once or one and a half
-times 0.4 m; u, none or a half; c, 0.01 or 0.1; p, from a half to 1. So is what h did to the layout
+times 0.4 m; u, none or a half; c, 0.01 or 0.1; p, from a half to 1; and whether sizes tell anything
+at all, in one scene of ten not. So is what h did to the layout
 as a whole: nothing; shift it anywhere, 4 nats less likely beforehand; turn it by any angle, 4; both,
 8; or put it up anew, 1.4, where f = 1 / A and p may be anything. Each shift or turn counts with the
 room that it is uncertain by, of all that there are (Laplace): some turn fits any two objects, and
@@ -57,6 +58,7 @@ _MEASURED, _MISJUDGED = 0.98, 0.02  # so often a size is off by that, and by any
 _ANY_SIZE = 2.0  # B, 1/m^2: the sides of things are anything within 0.7 m
 _ANY = np.sin(pi / 40 * np.arange(0.5, 20)) ** 2  # a probability, unknown (Jeffreys)
 _VISIBLE = _ANY[10:]  # p, where nobody knows what was seen: most of it
+_UNTOLD = 0.1  # so often sizes tell nothing at all: seen in part, or by cells
 _ALIKE = np.linspace(0.05, 0.95, 10)  # share of the objects that are of the size of another
 _SHIFTED, _TURNED, _ANEW = 4.0, 4.0, 1.4  # nats
 _KAPPA = 1.0  # of the turns, von Mises: small ones are a little likelier
@@ -429,10 +431,10 @@ def _count_weights(n, m, unseen_i=True, unseen_j=True, p=_VISIBLE):
     """(K + 1,) log w_k for k = 0 ... K = min(N, M) pairs, with the mean over p where it is unknown."""
     k = np.arange(min(n, m) + 1)
     p = p[:, None]
-    left_out = (n - k) * unseen_j + (m - k) * unseen_i
-    chances = left_out * np.log(1 - p) + k * (unseen_i + unseen_j) / 2 * np.log(p)
+    chances = ((n - k) * unseen_j + (m - k) * unseen_i) * np.log(1 - p)
+    chances = chances + (n * unseen_i + m * unseen_j) * np.log(p)
     if unseen_i and unseen_j:
-        chances = chances - (n + m - k) * np.log(2 - p)
+        chances = chances - (n + m - k) * np.log(p * (2 - p))  # to be seen at all
     return scipy.special.gammaln(n + m - k) + np.logaddexp.reduce(chances, axis=0) - np.log(len(p))
 
 
@@ -462,21 +464,25 @@ def _cases(scene, turns, shifts, priors, free):
     lost_j, over_j = _found(j, i, origins * scene.moved, scene.moved)
     counts = _count_weights(n, m, i.seen is None, j.seen is None)
     counts = counts + (priors + lost_i + lost_j)[:, None]
-    others = scene.sizes[_quarters(turns)] + over_i[:, :, None] + over_j[:, None]
+    others, sizes = over_i[:, :, None] + over_j[:, None], scene.sizes[_quarters(turns)]
+    told = [(sizes, np.log(1 - _UNTOLD)), (0.0, np.log(_UNTOLD))]
     squares = np.abs(scene.y - images[:, :, None]) ** 2
     variances = {spread: scene.blur + spread**2 for spread in (0.0, *_SPREADS)}
     near = {spread: _normal_at(squares, each) * scene.area for spread, each in variances.items()}
     ratios, known = [], []
-    for spread, still in product(_SPREADS, _STILL):
+    for spread, still, carried in product(_SPREADS, _STILL, _CARRIED):
         shifted = (1 - still) * near[spread] + still * near[0.0]
-        ratios.extend(np.log((1 - carried) * shifted + carried) + others for carried in _CARRIED)
+        ratio = np.log((1 - carried) * shifted + carried) + others
         # The less was moved, the better shift and turn are known.
         room = free * np.log(np.sqrt(scene.blur.min()) if still else spread)
         # Untouched though turned about its own middle: no frame of reference does that to a layout.
-        known.extend([np.where(still * (free == 1), -_NEVER, room)] * len(_CARRIED))
+        room = np.where(still * (free == 1), -_NEVER, room)
+        for size, prior in told:
+            ratios.append(ratio + size)
+            known.append(room + prior)
     # Of what was put up anew nobody knows how many are still the same, nor whether all were seen.
     anew, turns = _count_weights(n, m, p=_ANY) - _ANEW, np.append(1, np.tile(turns, len(known)))
-    counts = np.vstack([anew, *(counts + each[:, None] - np.log(len(known)) for each in known)])
+    counts = np.vstack([anew, *(counts + each[:, None] - np.log(len(known) / len(told)) for each in known)])
     return _Cases(turns, counts, np.concatenate([scene.sizes[:1], *ratios]))
 
 
