@@ -12,7 +12,7 @@ were carried off, so that object a at x and object b at y are the same with the 
     f(a, b) = (1 - c) (u N(y; h(x), blur) + (1 - u) N(y; h(x), blur + sigma^2)) + c / A
     s(a, b) = 0.98 N(size_b; size_a) + 0.02 B
 
-with `blur` what the sides of boxes are off, B = 2 per m^2 the density of any size, and g that of a
+with `blur` what the sides of boxes are off, B the density of any size, at most 2 per m^2, and g that of a
 new object: a size of those beside it, or any. An object that is left out has gone, one in twenty,
 or stands where the other environment has not seen: all it costs is q = 1 - 0.95 p, where p says how
 surely its place was seen, averaged over where it may have been moved. Where nobody knows what was
@@ -55,7 +55,7 @@ _SPREADS, _STILL, _CARRIED = (0.5, 1.0, 1.5), (0.0, 0.5), (0.01, 0.1)
 _FOUND = 0.95  # of all objects that stand where it was seen; the others have gone or were missed
 _REACHED, _ASSUMED = 0.035, 0.3  # m, sd of a side that a beam reached, and of another
 _MEASURED, _MISJUDGED = 0.98, 0.02  # so often a size is off by that, and by anything
-_ANY_SIZE = 2.0  # B, 1/m^2: the sides of things are anything within 0.7 m
+_SIZES = 0.28  # m, sd of the sides of things: as a density 2 per m^2, for what is measured exactly
 _ANY = np.sin(pi / 40 * np.arange(0.5, 20)) ** 2  # a probability, unknown (Jeffreys)
 _VISIBLE = _ANY[10:]  # p, where nobody knows what was seen: most of it
 _UNTOLD = 0.1  # so often sizes tell nothing at all: seen in part, or by cells
@@ -392,18 +392,27 @@ def _extents(environment):
 def _size_ratios(environment_i, environment_j):
     extents, variances = zip(_extents(environment_i), _extents(environment_j), strict=True)
     new_i, new_j = _as_new(extents, variances)
+    any_i, any_j = map(_any_size, variances)
+    any_size = _MISJUDGED * np.sqrt(any_i[:, None] * any_j)
     ratios = []
     for axes in ([0, 1], [1, 0]):
         same = _normal(extents[0][:, axes], extents[1], variances[0][:, axes], variances[1])
-        ratios.append(np.log(_MEASURED * same + _MISJUDGED * _ANY_SIZE) - (new_i[:, None] + new_j) / 2)
+        ratios.append(np.log(_MEASURED * same + any_size) - (new_i[:, None] + new_j) / 2)
     return np.array(ratios)
 
 
 def _normal(one, other, variances_one, variances_other):
-    """(N, M) density of the difference between sizes (N, 2) and (M, 2), in 1/m^2."""
-    variances = variances_one[:, None] + variances_other
+    """(N, M) density in 1/m^2 of one size (M, 2), if its thing is that of another one (N, 2)."""
+    # What is measured worse than things differ says no more of the other than that they are things.
+    both = [(each + each * _SIZES**2 / (each + _SIZES**2)) / 2 for each in (variances_one, variances_other)]
+    variances = both[0][:, None] + both[1]
     squares = (one[:, None] - other) ** 2 / variances
     return np.exp(-squares.sum(axis=2) / 2) / (2 * pi * np.sqrt(variances.prod(axis=2)))
+
+
+def _any_size(variances):
+    """(N,) density B in 1/m^2 of a size, measured with variances (N, 2), of no thing in particular."""
+    return 1 / (2 * pi * np.sqrt((variances + _SIZES**2).prod(axis=1)))
 
 
 def _as_new(extents, variances):
@@ -412,14 +421,16 @@ def _as_new(extents, variances):
     It is like one of the others beside it, or any; how often which, the two environments tell.
     """
     like = [_like_others(*each) for each in zip(extents, variances, strict=True)]
-    beside = np.concatenate([each if len(each) > 1 else [] for each in like])
-    evidence = np.log(_ALIKE[:, None] * beside + (1 - _ALIKE[:, None]) * _ANY_SIZE).sum(axis=1)
+    other = [_any_size(each) for each in variances]
+    beside = [np.stack(each) for each in zip(like, other, strict=True) if len(each[0]) > 1]
+    like_any = np.concatenate([np.empty((2, 0)), *beside], axis=1)
+    evidence = np.log(_ALIKE[:, None] * like_any[0] + (1 - _ALIKE[:, None]) * like_any[1]).sum(axis=1)
     alike = np.average(_ALIKE, weights=np.exp(evidence - evidence.max()))
     across = _normal(*extents, *variances)
     for k, each in enumerate(like):
         if len(each) == 1:  # there are no others beside it
             like[k] = across.mean(axis=1 - k)
-    return [np.log(alike * each + (1 - alike) * _ANY_SIZE) for each in like]
+    return [np.log(alike * each + (1 - alike) * any_size) for each, any_size in zip(like, other, strict=True)]
 
 
 def _like_others(extents, variances):
