@@ -642,9 +642,10 @@ def _distinct(images, families):
 def _that_count(cases):
     """Those alone that may hold a share of the probability worth telling."""
     step = np.diff(cases.counts[:, [0, -1]])[:, :, None] / (cases.counts.shape[1] - 1)
-    pairs = np.exp(cases.ratios + step)
+    every = 1 + cases.ratios.shape[1] // (2 * _PROBES)  # of a crowd some speak for the others
+    pairs = np.exp(cases.ratios[:, ::every] + step)
     bounds = [np.log1p(pairs.sum(axis=axis)).sum(axis=1) for axis in (1, 2)]
-    bound = cases.counts[:, 0] + np.minimum(*bounds)
+    bound = cases.counts[:, 0] + every * np.minimum(*bounds)
     return cases[bound > bound.max() - _NEGLIGIBLE]
 
 
