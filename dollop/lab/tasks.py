@@ -11,19 +11,38 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from dollop.checks import check_choice, checked_number
 from dollop.environment import Environment
+
+__all__ = [
+    "DrawnTask", "draw_layout", "draw_layouts", "draw_task", "other_way", "size_of", "walked", "way_through",
+]  # fmt: skip
 
 ROOM, APART, BOX = 6.0, 0.9, (0.25, 0.6)
 """m: side of the room, least distance between centres of objects, and range of their sides."""
-PERIOD = 0.1
+MOST = 20
+"""Objects that a room of that size surely holds that far apart."""
+MOVED = 0.5
+"""m by which each object of a layout that is "moved" stands elsewhere than in the first."""
+KINDS = ("anywhere", "moved", "still")
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnTask:
-    """V via-points beside objects.
+    """V via-points beside some of N objects (a set-up of our own).
 
-    `objects` (V,) int the object of each, `offsets` (V, 2) in m from its centre, `sizes` (N, 2) in m of all objects,
-    `knots` the power of the distance between via-points that spaces the spline's knots, `ends` its end condition.
+    Attributes
+    ----------
+    objects : (V,) int array
+        The object that each via-point follows.
+    offsets : (V, 2) float array
+        Each via-point from the middle of its object, in m.
+    sizes : (N, 2) float array
+        Of all objects along x and y, in m.
+    knots : float
+        The power of the distance between via-points by which the spline's knots are spaced.
+    ends : str
+        The spline's end condition, as scipy's `CubicSpline` names it.
     """
 
     objects: np.ndarray
@@ -33,20 +52,78 @@ class DrawnTask:
     ends: str
 
     def via(self, centres):
-        """(V, 2): where the via-points are among objects at `centres` (N, 2)."""
+        """Where the via-points are.
+
+        Parameters
+        ----------
+        centres : (N, 2) float array
+            Of the objects, in m.
+
+        Returns
+        -------
+        (V, 2) float array
+            In m.
+        """
         return centres[self.objects] + self.offsets
 
     def way(self, centres, scatter=0.0, samples=120):
-        """(samples, 2): what the person means to walk there, each via-point missed by `scatter` (V, 2) in m."""
+        """What the person means to walk.
+
+        Parameters
+        ----------
+        centres : (N, 2) float array
+            Of the objects, in m.
+        scatter : (V, 2) float array or float
+            By which each via-point is missed, in m.
+        samples : int
+
+        Returns
+        -------
+        (samples, 2) float array
+            At equal distances, in m.
+
+        Examples
+        --------
+        Where all objects have moved by the same, the way has.
+
+        >>> task, rng = draw_task(3, np.random.default_rng(0)), np.random.default_rng(1)
+        >>> centres = draw_layout(3, rng)
+        >>> bool(np.allclose(task.way(centres + [1.0, 2.0]), task.way(centres) + [1.0, 2.0]))
+        True
+        """
         return way_through(self.via(centres) + scatter, self.knots, self.ends, samples)
 
     def environment(self, centres):
-        """The objects as boxes."""
+        """The objects as boxes.
+
+        Parameters
+        ----------
+        centres : (N, 2) float array
+            Of the objects, in m.
+
+        Returns
+        -------
+        Environment
+        """
         return Environment(np.hstack([centres - self.sizes / 2, centres + self.sizes / 2]))
 
 
 def draw_task(n_objects, rng, followed=None):
-    """A task of 4 to 7 via-points beside two objects at least, neighbours mostly beside different ones."""
+    """Draw a task of 4 to 7 via-points beside two objects at least, neighbours mostly beside different ones.
+
+    Parameters
+    ----------
+    n_objects : int
+        N.
+    rng : numpy.random.Generator
+        Source of chance.
+    followed : int, optional
+        How many of the objects play a part; 2 to 4 by chance when not given.
+
+    Returns
+    -------
+    DrawnTask
+    """
     count = int(rng.integers(4, 8))
     followed = min(n_objects, int(rng.integers(2, 5))) if followed is None else followed
     chosen = rng.choice(n_objects, followed, replace=False)
@@ -60,7 +137,26 @@ def draw_task(n_objects, rng, followed=None):
 
 
 def draw_layout(n_objects, rng):
-    """(N, 2): centres anywhere in the room, no two nearer than `APART`."""
+    """Draw where objects stand, anywhere in the room, no two nearer than `APART`.
+
+    Parameters
+    ----------
+    n_objects : int
+        N, at most `MOST`.
+    rng : numpy.random.Generator
+        Source of chance.
+
+    Returns
+    -------
+    (N, 2) float array
+        Their middles in m.
+
+    Raises
+    ------
+    ValueError
+        For more objects than the room holds.
+    """
+    checked_number("n_objects", n_objects, 0, MOST)
     centres = []
     while len(centres) < n_objects:
         place = rng.uniform(-ROOM / 2, ROOM / 2, 2)
@@ -70,18 +166,62 @@ def draw_layout(n_objects, rng):
 
 
 def draw_layouts(n_objects, count, rng, kind="anywhere"):
-    """So many layouts: "anywhere", "moved" by 0.5 m each from the first in any direction, or "still"."""
+    """Draw so many layouts of the same objects.
+
+    Parameters
+    ----------
+    n_objects : int
+        N.
+    count : int
+        How many layouts.
+    rng : numpy.random.Generator
+        Source of chance.
+    kind : {"anywhere", "moved", "still"}
+        Each drawn anew; each object 0.5 m from where it stands in the first one, in any direction; or all the same.
+
+    Returns
+    -------
+    list of (N, 2) float arrays
+        Middles of the objects, in m.
+
+    Raises
+    ------
+    ValueError
+        For another kind, or more objects than the room holds.
+    """
+    check_choice("kind", kind, KINDS)
     first = draw_layout(n_objects, rng)
     if kind == "anywhere":
         return [first, *(draw_layout(n_objects, rng) for _ in range(count - 1))]
-    turns = rng.uniform(-np.pi, np.pi, (count, n_objects)) if kind == "moved" else None
     if kind == "still":
         return [first] * count
-    return list(first + 0.5 * np.stack([np.cos(turns), np.sin(turns)], axis=2))
+    turns = rng.uniform(-np.pi, np.pi, (count, n_objects))
+    return list(first + MOVED * np.stack([np.cos(turns), np.sin(turns)], axis=2))
 
 
 def way_through(via, knots=0.5, ends="natural", samples=120):
-    """(samples, 2): a spline through via-points, at even steps of its length."""
+    """A spline through via-points.
+
+    Parameters
+    ----------
+    via : (V, 2) float array
+        In m.
+    knots : float
+        The power of the distance between via-points by which the knots are spaced.
+    ends : str
+        End condition, as scipy's `CubicSpline` names it.
+    samples : int
+
+    Returns
+    -------
+    (samples, 2) float array
+        At equal distances, in m.
+
+    Examples
+    --------
+    >>> way_through(np.array([[0.0, 0.0], [3.0, 0.0], [4.0, 0.0]]), knots=1.0, samples=5).round(6).tolist()
+    [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [4.0, 0.0]]
+    """
     at = np.r_[0, np.maximum(np.hypot(*np.diff(via, axis=0).T), 1e-3) ** knots].cumsum()
     way = scipy.interpolate.CubicSpline(at, via, bc_type=ends)(np.linspace(0, at[-1], 20 * samples))
     length = np.r_[0, np.hypot(*np.diff(way, axis=0).T).cumsum()]
@@ -89,7 +229,28 @@ def way_through(via, knots=0.5, ends="natural", samples=120):
 
 
 def walked(task, centres, rng, scatter=0.05, sway=0.03, noise=0.01):
-    """One walk of the task among objects at `centres`: (N, 2) in m."""
+    """One walk of a task, as a person would walk it who never does so twice alike.
+
+    Parameters
+    ----------
+    task : DrawnTask
+        Of V via-points.
+    centres : (N, 2) float array
+        Of the objects, in m.
+    rng : numpy.random.Generator
+        Source of chance.
+    scatter : float
+        Standard deviation in m by which a via-point is missed along each axis.
+    sway : float
+        In m to either side, once in 1.5 to 3 m of the way.
+    noise : float
+        Standard deviation in m of each sample along each axis.
+
+    Returns
+    -------
+    (25 V, 2) float array
+        In m.
+    """
     shape = task.offsets.shape
     way = task.way(centres, rng.normal(0, scatter, shape), samples=25 * len(task.offsets))
     length = np.r_[0, np.hypot(*np.diff(way, axis=0).T).cumsum()]
@@ -101,12 +262,41 @@ def walked(task, centres, rng, scatter=0.05, sway=0.03, noise=0.01):
 
 
 def size_of(way):
-    """Diagonal in m of the box round a way."""
+    """Diagonal of the box round a way.
+
+    Parameters
+    ----------
+    way : (N, 2) float array
+        In m.
+
+    Returns
+    -------
+    float
+        In m.
+
+    Examples
+    --------
+    >>> size_of(np.array([[0.0, 0.0], [3.0, 4.0], [1.0, 1.0]]))
+    5.0
+    """
     return float(np.hypot(*np.ptp(way, axis=0)))
 
 
 def other_way(task, rng):
-    """The same task done in another way: same beginning and end, between them beside other objects or on other sides."""
+    """The same task done in another way, from the same beginning to the same end.
+
+    Between them, most via-points are on the other side of their object, and half of those beside any object.
+
+    Parameters
+    ----------
+    task : DrawnTask
+    rng : numpy.random.Generator
+        Source of chance.
+
+    Returns
+    -------
+    DrawnTask
+    """
     offsets, objects = task.offsets.copy(), task.objects.copy()
     middle = np.arange(1, len(objects) - 1)
     changed = rng.choice(middle, max(1, len(middle) - int(rng.integers(0, 2))), replace=False)
