@@ -17,7 +17,7 @@ def test_the_way_passes_its_via_points_wherever_the_objects_stand(seed):
         via = task.via(centres)
         np.testing.assert_allclose(via - centres[task.objects], task.offsets)
         assert distance_to_polyline(via, task.way(centres, samples=600)).max() < 0.03
-        assert 0.45 <= np.hypot(*task.offsets.T).min() and np.hypot(*task.offsets.T).max() <= 0.9
+        assert np.hypot(*task.offsets.T).min() >= 0.45 and np.hypot(*task.offsets.T).max() <= 0.9
 
 
 @pytest.mark.parametrize("kind", KINDS)
