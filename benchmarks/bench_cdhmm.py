@@ -1,5 +1,6 @@
 """How long merging demonstrations takes, beside a plain loop: python -m benchmarks cdhmm."""
 
+import tracemalloc
 from math import inf, lgamma, log, pi
 
 import numpy as np
@@ -9,7 +10,8 @@ from dollop.lab.drawn import draw_demonstrations
 from dollop.replication.baseline import merged
 
 TASK = np.random.default_rng(0).uniform(-4, 4, (10, 2))  # ten subgoals in a room of 8 m
-CASES = ((10, 0.05, 7), (100, 2.0, 3))  # demonstrations, bound in s, repetitions
+CASES = ((10, 0.04, 15), (100, 1.0, 3), (1000, 10.0, 1))  # demonstrations, bound in s, repetitions
+SPREADS = {"named": 0.15, "estimated": None}  # m
 
 
 def run():
@@ -18,15 +20,29 @@ def run():
     Returns
     -------
     list of dict
-        The plain loop only where it ends in reasonable time.
+        The plain loop only where it ends in reasonable time; the peak of memory of the largest case.
     """
     rows = []
     for n, bound, repeats in CASES:
         demonstrations = draw_demonstrations(TASK, n, 0.1, seed=1)
-        median, _ = seconds(lambda shown=demonstrations: merged(shown), repeats)
         baseline = seconds(lambda shown=demonstrations: plain_loop(shown), 1)[0] if n <= 10 else None
-        rows.append(row(f"merge {n} demonstrations of 10 subgoals", median, baseline, bound))
+        for how, spread in SPREADS.items():
+            median, _ = seconds(lambda shown=demonstrations, told=spread: merged(shown, told), repeats)
+            name = f"merge {n} demonstrations of 10 subgoals, spread {how}"
+            if n == 1000:
+                name += f", peak {peak_memory(demonstrations, spread):.0f} MiB"
+            rows.append(row(name, median, baseline, bound))
     return rows
+
+
+def peak_memory(demonstrations, spread):
+    """The most memory that merging held at once, beyond what was held before, in MiB."""
+    tracemalloc.start()
+    try:
+        merged(demonstrations, spread)
+        return tracemalloc.get_traced_memory()[1] / 2**20
+    finally:
+        tracemalloc.stop()
 
 
 def plain_loop(demonstrations, spread=0.15):

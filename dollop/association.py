@@ -26,7 +26,7 @@ import numpy as np
 
 from dollop.checks import checked_array, checked_positions
 from dollop.environment import Environment
-from dollop.matching import match_confidently
+from dollop.matching import match_surely
 from dollop.pose import rotation, wrapped
 
 __all__ = ["Association", "FrameAssociation", "Frames", "associate", "associate_with_frames"]
@@ -127,7 +127,7 @@ class Association:
     def _ties(self, environment, matching):
         """Where all corners go (4N,), where those of each subgoal go (K, m), and their weights."""
         names = "the associated environment", "the new one"
-        matching = matching or match_confidently(self.environment, environment, names)
+        matching = matching or match_surely(self.environment, environment, names)[0]
         n, m, indices = len(self.environment.corners), len(environment.corners), matching.indices
         highest = indices.max(initial=-1)
         if len(indices) != n or highest >= m:

@@ -2,50 +2,74 @@
 
 The literal method is the paper's: springs between all 4N corners, a bijection that changes the
 forces least. Its forces are dominated by the springs within each box, so that an error of a few
-centimetres in a box outweighs where the boxes stand. The robust method, the default, matches
-objects first and corners after. It takes it that every object was moved by itself, and that the
-layout may have been turned and shifted as a whole before. With z_a and w_a the n matched positions
-of the two environments about their means, as complex numbers, and with
-s = sum_a conj(z_a) w_a / sigma^2, a matching costs, in nats (negative log probability, but for a
-constant),
+centimetres in a box outweighs where the boxes stand.
 
-    sum_a (|z_a|^2 + |w_a|^2) / (2 sigma^2)                   objects moved by themselves
-    - log(exp(Re s) + exp(|s + kappa| - kappa - L_turn))      no turn, or any, for L_turn
-    - log(exp(-n |shift|^2 / (2 sigma^2)) + exp(-L_shift))    no shift, or any, for L_shift
-    + c (N + M - 2n)                                          each object left out
+The robust method, the default, is a reconstruction. It matches objects first and corners after, and
+tells how probable that is, by one model for every number of objects. K objects stand in a room of
+area A, K unknown, and each is in view of either environment with its own probability. From one to
+the other most are shifted a little and some are carried off, so that object a at x and object b at
+y are the same with the density
 
-with sigma the standard deviation of the moves per axis, and the shift that of the mean. All this is
-a reconstruction.
-The second line is the closed form of the best turn: a turn by theta takes Re(e^{-i theta} s) off
-the first line and costs kappa (1 - cos theta), least at theta = arg(s + kappa). While no object is
-left out the shift is the same for all matchings, so that only relative positions count. Where some
-are missing, the rest may fit in several places; then staying in place counts, by L_shift at most.
+    f(a, b) = 0.9 N(y; h(x), sigma^2) + 0.1 / A        where it stands, sigma = 0.4 m per axis
+    s(a, b) = 0.95 N(size_b; size_a) + 0.05 B          how large it looks, B = 1 per m^2
+
+An object that is not found in the other environment has gone (one in twenty), or where it would
+stand was not seen: p, averaged over where it may have been moved, is how surely it was. All it costs
+is q = 1 - 0.95 p. Where nobody knows what was seen p is anything from 1/2 to 1, the same for all. A
+new object is of a size g as others beside it are, or of any. A matching of k pairs then has the
+probability
+
+    P = 1/Z  w_k  prod_(a, b)  A f(a, b) s(a, b) / sqrt(g_a g_b)  *  sqrt((1 - q_a) (1 - q_b)) / (q_a q_b)
+
+where w_k = (N + M - k - 1)! counts the ways to scatter the distinct objects, K having the prior
+1 / K, and holds the average over p where that is unknown. Z sums over all partial matchings: a sum
+over sets of columns (exact, up to twelve objects), by belief propagation for more. What a layout
+was as a whole before, h, is summed over too: in place; shifted anywhere, 6 nats less likely
+beforehand; turned by any angle, 4; both, 10; or put up anew without regard to what was (f = 1 / A),
+3. Each shift or turn counts with the room that its uncertainty takes of all shifts and turns there
+are (Laplace): of two objects some turn fits always, and that is no evidence.
 """
 
-from dataclasses import dataclass
-from functools import lru_cache
-from itertools import combinations, permutations, product
-from math import comb, perm, pi
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations, product
+from math import pi
 
 import numpy as np
 import scipy
 
-from dollop.checks import check_choice, check_positive
+from dollop.checks import Note, check_choice, check_positive
 from dollop.environment import corner_indices, integer_costs
+from dollop.gridmap import covered_cells
 
-__all__ = ["Matching", "match", "match_confidently"]
+__all__ = ["SURE", "Matching", "match", "match_surely"]
 
-_KAPPA = 1.0  # of a layout that was turned, small turns are a little likelier
-_TURNED = 4.0  # L_turn, nats
-_SHIFTED = 6.0  # L_shift, nats
-# What makes a matching cost 0 if nothing moved:
-_UNMOVED = np.log1p(np.exp(-_TURNED)) + np.log1p(np.exp(-_SHIFTED))
-_ODDS = 20.0  # a matching is confident where it is this much more probable than the second best
+SURE = 0.95
+"""What is at least so probable is used without asking."""
 
-_ENUMERATED = 2000  # up to so many partial matchings all are tried
-_STARTS = 8  # beyond, so many of the alignments that fit best are refined
-_REFINEMENTS = 100  # never reached but where costs tie
-_PROBES = 50  # by so many objects at most it is judged how well an alignment fits
+# What nobody knows, each value as likely as any: how far objects were shifted, times `moved`, which
+# share of them was not touched at all, and which was carried off.
+_SPREADS, _STILL, _CARRIED = (0.5, 1.0, 1.5), (0.0, 0.5), (0.01, 0.1)
+_FOUND = 0.95  # of all objects that stand where it was seen; the others have gone or were missed
+_REACHED, _ASSUMED = 0.035, 0.3  # m, sd of a side that a beam reached, and of another
+_MEASURED, _MISJUDGED = 0.98, 0.02  # so often a size is off by that, and by anything
+_ANY_SIZE = 2.0  # B, 1/m^2: the sides of things are anything within 0.7 m
+_VISIBLE = np.sin(pi / 4 + pi / 40 * np.arange(0.5, 10)) ** 2  # p where unknown: Jeffreys, from 1/2
+_ALIKE = np.linspace(0.05, 0.95, 10)  # share of the objects that are of the size of another
+_SHIFTED, _TURNED, _ANEW = 4.0, 4.0, 1.4  # nats
+_KAPPA = 1.0  # of the turns, von Mises: small ones are a little likelier
+_NARROWEST = 5.0  # m, side of a room
+_WHERETO = np.linspace(-2, 2, 9)  # standard deviations by which an object may have been moved
+
+_EXACT = 12  # up to so many objects all matchings are summed
+_STARTS = 8  # so many of the alignments that fit best are refined, in so many steps
+_STEPS = 6
+_NEGLIGIBLE = 7.0  # nats below the best a case no longer counts
+_HOPELESS = 25.0  # nats below the best an alignment cannot count, whatever the moves
+_NEVER = 1e6  # nats
+_PROBES = 25  # by so many objects at most it is judged how well an alignment fits
+_BELIEFS = 200  # steps of belief propagation at most
+_RARE = 1e-3  # pairs less probable than this connect nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,18 +81,23 @@ class Matching:
     indices : (4N,) int array
         Corner a of i goes to corner indices[a] of j; -1 where it is left out.
     cost : float
-        Literal: the total change in force in 1/alpha 1/m². Robust: nats, see the module.
+        Literal: the total change in force in 1/alpha 1/m². Robust: how much less probable the
+        matching is than if nothing of what is matched had moved or looked different, in nats.
     margin : float
         What the best of all other matchings costs more; 0 is a tie. Literal: of all other
         bijections of the corners. Robust: of all matchings with another partner for one object at
-        least.
+        least, in nats of probability.
     confident : bool
         False where the scene is ambiguous: ask, do not guess. Literal: the margin exceeds what
-        rounding up can do, one unit per corner. Robust: the matching is at least 20 times as
-        probable as the second best.
+        rounding up can do, one unit per corner. Robust: the probability is at least `SURE`.
     turn : float
         By how much the layout has turned from i to j, in rad; 0 where that need not be, and with
         the literal method.
+    probability : float
+        Of the whole matching among all that there are; NaN with the literal method.
+    pair_probabilities : (N, M + 1) array
+        How probable it is that object a of i is object b of j; in the last column, that it is none
+        of them. None with the literal method.
     """
 
     indices: np.ndarray
@@ -76,11 +105,13 @@ class Matching:
     margin: float
     confident: bool
     turn: float = 0.0
+    probability: float = np.nan
+    pair_probabilities: np.ndarray = None
 
     def __repr__(self):
-        pairs = ", ".join(f"{a} to {b}" for a, b in enumerate(self.partners) if b >= 0)
-        sure = "confident" if self.confident else "not confident"
-        return f"Matching of objects {pairs or 'none'}: {sure}, margin {self.margin:.3g}"
+        told = ", ".join(map(self._told, range(len(self.partners)))) or "none"
+        whole = "" if np.isnan(self.probability) else f", as a whole {_percent(self.probability)}"
+        return f"Matching of objects {told}: {'' if self.confident else 'not '}confident{whole}"
 
     @classmethod
     def identity(cls, n):
@@ -95,41 +126,102 @@ class Matching:
         -------
         Matching
         """
-        return cls(corner_indices(np.arange(n)), 0.0, np.inf, True)
+        return cls.of_partners(np.arange(n))
+
+    @classmethod
+    def of_partners(cls, partners, turn=0.0):
+        """A matching that somebody who knows has given, beyond doubt (beyond the paper).
+
+        Parameters
+        ----------
+        partners : (N,) array_like of int
+            For each object of i the one of j that it is; -1 where it has gone.
+        turn : float
+            By how much the layout has turned, in rad; the corners go by the nearest right angle.
+
+        Returns
+        -------
+        Matching
+
+        Raises
+        ------
+        ValueError
+            Where two objects are to be the same one, or a number is none of an object.
+
+        Examples
+        --------
+        >>> Matching.of_partners([1, -1, 0])
+        Matching of objects 0 to 1, 1 gone, 2 to 0: confident, as a whole 100 %
+        """
+        given = np.array(partners, dtype=float).reshape(-1)
+        partners = given.astype(int)
+        taken = np.sort(partners[partners >= 0])
+        if (partners != given).any() or (partners < -1).any() or (taken[1:] == taken[:-1]).any():
+            raise ValueError(f"partners must be numbers of objects, none twice, or -1, got {given.tolist()}")
+        told = np.eye(taken.max(initial=-1) + 2)[partners]  # -1 is the last column
+        return cls(corner_indices(partners, turn), 0.0, np.inf, True, float(turn), 1.0, told)
 
     @property
     def partners(self):
         """(N,) int array: object a of i goes to object partners[a] of j, -1 where left out."""
         return self.indices[::4] // 4
 
+    @property
+    def sure(self):
+        """(N,) bool array: what is said of this object has a probability of `SURE` at least."""
+        if self.pair_probabilities is None:
+            return np.full(len(self.partners), self.confident)
+        return self._shares() >= SURE
 
-def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4):
+    def _shares(self):
+        """(N,) how probable it is what is said of each object."""
+        return np.take_along_axis(self.pair_probabilities, self.partners[:, None], axis=1)[:, 0]
+
+    def _told(self, a):
+        """What is said of object a, and where that is not sure also how probable that and the rival are."""
+        said = _in_words(self.partners[a])
+        if self.pair_probabilities is None or self.sure[a]:
+            return f"{a} {said}"
+        shares = self.pair_probabilities[a].copy()
+        share, shares[self.partners[a]] = shares[self.partners[a]], -1
+        rival = shares.argmax()
+        other = _in_words(rival if rival < len(shares) - 1 else -1)
+        return f"{a} {said} ({_percent(share)}; {other} {_percent(shares[rival])})"
+
+
+def _in_words(partner):
+    return f"to {partner}" if partner >= 0 else "gone"
+
+
+def _percent(share):
+    """A probability that is not rounded up to certainty."""
+    return f"{share:.0%}".replace("%", " %") if share < 0.995 or share == 1 else f"{np.floor(1e3 * share) / 10:.1f} %"
+
+
+def match(environment_i, environment_j, method="robust", moved=0.4):
     """Match the corners of two environments (Sec. IV-A).
 
     Parameters
     ----------
     environment_i, environment_j : Environment
-        At least two objects each.
+        Any number of objects. With "literal" at least two each.
     method : {"robust", "literal"}
-        "robust" compares the layouts of the objects and takes the corners from that; objects may be
-        missing, added or split. "literal" is the paper's: a bijection of the corners with the least
-        change in spring forces.
-    left_out : float
-        Robust only. Leaving out an object of each environment costs as much as if one had been
-        moved by this many metres, beside the others.
+        "robust" compares the layouts and the sizes of the objects, knows what could be seen, and
+        takes the corners from that; objects may be missing, added or split. "literal" is the
+        paper's: a bijection of the corners with the least change in spring forces.
     moved : float
         Robust only. How far objects are moved by themselves: sigma, standard deviation per axis in
-        m. Where they move farther than this, matchings are called confident too easily.
+        m.
 
     Returns
     -------
     Matching
-        With the margin to the second best. Look at `.confident` before use.
+        Look at `.confident` before use, or at `.sure` of each object.
 
     Raises
     ------
     ValueError
-        Fewer than two objects; with "literal" also different counts, or corners that coincide.
+        With "literal": fewer than two objects, different counts, or corners that coincide.
 
     Examples
     --------
@@ -139,41 +231,46 @@ def match(environment_i, environment_j, method="robust", left_out=3.0, moved=0.4
     >>> boxes = np.array([[0, 0, 0.4, 0.4], [3, 1, 3.4, 1.4], [1, 4, 1.4, 4.4]])
     >>> match(Environment(boxes), Environment(boxes[[2, 0, 1]])).indices.tolist()
     [4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3]
+
+    One object against another one far away, of another size: these are two.
+
+    >>> match(Environment([[0, 0, 0.3, 0.3]]), Environment([[4, 0, 4.8, 0.5]])).partners.tolist()
+    [-1]
     """
     check_choice("method", method, ("robust", "literal"))
-    check_positive("left_out", left_out)
     check_positive("moved", moved)
+    if method == "robust":
+        return _match_robustly(environment_i, environment_j, moved)
     counts = f"{len(environment_i)} and {len(environment_j)}"
     if min(len(environment_i), len(environment_j)) < 2:
-        raise ValueError(f"matching compares layouts: each environment needs at least 2 objects, got {counts}")
-    if method == "literal" and len(environment_i) != len(environment_j):
+        raise ValueError(f"the literal method compares layouts: at least 2 objects in each, got {counts}")
+    if len(environment_i) != len(environment_j):
         raise ValueError(f"the literal method is a bijection and needs the same number of objects, got {counts}")
-    if method == "literal":
-        return _match_literally(environment_i, environment_j)
-    return _match_robustly(environment_i, environment_j, left_out, moved)
+    return _match_literally(environment_i, environment_j)
 
 
-def match_confidently(environment_i, environment_j, names):
-    """The robust matching of two environments, if it is sure (reconstruction).
+def match_surely(environment_i, environment_j, names):
+    """The robust matching of two environments, as far as it is sure (reconstruction).
 
-    Of one object in each there is only one; and where all boxes are the same, none has moved.
+    Where all boxes are the same, none has moved.
 
     Parameters
     ----------
     environment_i, environment_j : Environment
-        At least two objects each, or one each, or the same ones.
     names : (str, str)
-        What to call the two in the error.
+        What to call the two in errors and notes.
 
     Returns
     -------
-    Matching
-        A confident one.
+    matching : Matching
+        Objects of which it is not sure what became of them are left out.
+    notes : tuple of Note
+        Which these are, and how probable what is.
 
     Raises
     ------
     ValueError
-        As `match`, and if a second matching is nearly as good: then ask the user, do not guess.
+        Where nothing is sure of any object: then ask the user, do not guess.
 
     Examples
     --------
@@ -181,25 +278,28 @@ def match_confidently(environment_i, environment_j, names):
 
     >>> from dollop.environment import Environment
     >>> before = Environment([[0, 0, 1, 1], [3, 0, 4, 1]])
-    >>> match_confidently(before, before, ("before", "after")).partners.tolist()
+    >>> match_surely(before, before, ("before", "after"))[0].partners.tolist()
     [0, 1]
     >>> after = Environment([[0, 0, 1, 1], [0, 3, 1, 4]])
-    >>> match_confidently(before, after, ("before", "after"))  # doctest: +ELLIPSIS
+    >>> match_surely(before, after, ("before", "after"))  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    ValueError: before and after cannot be matched with confidence: ... only 0.00 more...
+    ValueError: before and after cannot be matched with confidence: ...
     """
-    unmoved = np.array_equal(environment_i.boxes, environment_j.boxes)
-    if unmoved or len(environment_i) == len(environment_j) == 1:
-        return Matching.identity(len(environment_i))
-    try:
-        matching = match(environment_i, environment_j)
-    except ValueError as error:
-        raise ValueError(f"{' and '.join(names)}: {error}") from error
-    if not matching.confident:
-        found = f"the second-best matching costs only {matching.margin:.2f} more"
-        pair, advice = " and ".join(names), "give the matching, or move the objects apart"
-        raise ValueError(f"{pair} cannot be matched with confidence: {found}; {advice}")
-    return matching
+    if np.array_equal(environment_i.boxes, environment_j.boxes):
+        return Matching.identity(len(environment_i)), ()
+    matching = match(environment_i, environment_j)
+    doubtful = np.flatnonzero(~matching.sure)
+    if not len(doubtful):
+        return matching, ()
+    pair, found = " and ".join(names), ", ".join(map(matching._told, doubtful))
+    if len(doubtful) == len(environment_i):
+        rule = f"nothing reaches the {_percent(SURE)} that it takes"
+        advice = "give the matching, as adapt(environment, matching=Matching.of_partners([...]))"
+        advice += " or learn(..., matchings=[...]), or move the objects apart"
+        raise ValueError(f"{pair} cannot be matched with confidence: {found}; {rule}; {advice}")
+    indices = np.where(np.repeat(matching.sure, 4), matching.indices, -1)
+    text = f"{pair}: it is not sure which object is which of {found}; what is tied to them alone is not moved"
+    return replace(matching, indices=indices), (Note("matching", text, doubt=False),)
 
 
 def _match_literally(environment_i, environment_j):
@@ -209,123 +309,498 @@ def _match_literally(environment_i, environment_j):
     return Matching(indices, float(costs[rows, indices].sum()), margin, margin > len(indices))
 
 
-def _match_robustly(environment_i, environment_j, left_out, moved):
-    x, y = (each.centres @ (1, 1j) / moved for each in (environment_i, environment_j))  # sigma is 1
-    # One object of each left out costs as a move by left_out: 2 c = left_out^2 / (2 sigma^2).
-    price = (left_out / moved) ** 2 / 4
-    ways = sum(comb(len(x), k) * perm(len(y), k) for k in range(len(x) + 1))
-    partners, cost, margin, turn = (_enumerate if ways <= _ENUMERATED else _search)(x, y, price)
-    indices, confident = corner_indices(partners, turn), bool(margin >= np.log(_ODDS))
-    return Matching(indices, float(cost), float(margin), confident, float(turn))
+def _match_robustly(environment_i, environment_j, moved):
+    n, m = len(environment_i), len(environment_j)
+    if not (n and m):
+        told = np.eye(m + 1)[np.full(n, m)]
+        return replace(Matching.of_partners(np.full(n, -1)), pair_probabilities=told)
+    scene = _Scene((environment_i, environment_j), moved)
+    cases = _that_count(_cases(scene, *_alignments(scene)))
+    sums, marginals = (_summed if min(n, m) <= _EXACT else _summed_in_parts)(cases)
+    total = np.logaddexp.reduce(sums)
+    pairs = np.tensordot(np.exp(sums - total), marginals, axes=1)
+    partners, likely, margin = _best(cases, pairs)
+    told = np.column_stack([pairs, np.maximum(1 - pairs.sum(axis=1), 0)])
+    said = np.take_along_axis(told, partners[:, None], axis=1)
+    probability = float(min(np.exp(np.logaddexp.reduce(likely) - total), said.min()))
+    turn = float(np.angle(cases.turns[likely.argmax()]))
+    indices, confident = corner_indices(partners, turn), probability >= SURE
+    return Matching(indices, -float(np.log(probability)), margin, confident, turn, probability, told)
 
 
-def _costs_of(x, y, partners, price):
-    """Cost (P,) and turn (P,) of each row of `partners` (P, N), by the formula of the module."""
-    matched = partners >= 0
-    n = matched.sum(axis=1)
-    z, mean_z = _centred(x * matched, matched)
-    w, mean_w = _centred(y[partners] * matched, matched)
-    likeness = (z.conj() * w).sum(axis=1)
-    turned = np.abs(likeness + _KAPPA) - _KAPPA - _TURNED
-    spread = (np.abs(z) ** 2 + np.abs(w) ** 2).sum(axis=1) / 2
-    stays = np.exp(-n * np.abs(mean_w - mean_z) ** 2 / 2)
-    costs = spread - np.logaddexp(likeness.real, turned) - np.log(stays + np.exp(-_SHIFTED))
-    costs += price * (len(x) + len(y) - 2 * n)
-    return costs + _UNMOVED, np.where(likeness.real >= turned, 0.0, np.angle(likeness + _KAPPA))
+# ---- how probable a pair is, and that an object is left out
 
 
-def _centred(positions, matched):
-    means = positions.sum(axis=1) / np.maximum(matched.sum(axis=1), 1)
-    return (positions - means[:, None]) * matched, means
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """Two environments, and how far objects are moved: sigma in m, the unit of x, y and area."""
+
+    environments: tuple
+    moved: float
+
+    @cached_property
+    def x(self):
+        """(N,) complex array: middles of the objects of i."""
+        return self.environments[0].centres @ (1, 1j) / self.moved
+
+    @cached_property
+    def y(self):
+        """(M,) complex array: middles of the objects of j."""
+        return self.environments[1].centres @ (1, 1j) / self.moved
+
+    @cached_property
+    def area(self):
+        """Of the room: of the floor that was seen, else as far as objects are spread."""
+        seen = [each.seen for each in self.environments if each.seen is not None]
+        areas = [np.count_nonzero(each.floor) * each.resolution**2 for each in seen]
+        spreads = [_spread(each.centres).prod() for each in self.environments]
+        return max(_NARROWEST**2, *(areas or spreads)) / self.moved**2
+
+    @cached_property
+    def blur(self):
+        """(N, M) array: variance per axis of the difference between two middles, as measured."""
+        # The middle is the mean of two sides: a quarter of their variances, that of the extent.
+        i, j = (_extents(each)[1].mean(axis=1) / (2 * self.moved) ** 2 for each in self.environments)
+        return i[:, None] + j
+
+    @cached_property
+    def sizes(self):
+        """(2, N, M) array: log s / sqrt(g g), as the boxes lie and turned by a right angle."""
+        return _size_ratios(*self.environments)
 
 
-def _enumerate(x, y, price):
-    """The best of all partial matchings, exactly, and what the second best costs more."""
-    partners = _all_partial(len(x), len(y))
-    costs, turns = _costs_of(x, y, partners, price)
-    best, second = np.argsort(costs, kind="stable")[:2]
-    return partners[best], costs[best], costs[second] - costs[best], turns[best]
+def _spread(centres):
+    """Width and depth in m of a room in which objects stand that far apart."""
+    n = len(centres)
+    # n places anywhere along a line of 1 are (n - 1) / (n + 1) apart, in the mean.
+    return np.maximum(np.ptp(centres, axis=0) * (n + 1) / max(n - 1, 1), _NARROWEST)
 
 
-@lru_cache(maxsize=32)
-def _all_partial(n, m):
-    """Every way to match some of n with some of m, (P, n), -1 where left out."""
-    found = []
-    for k in range(min(n, m) + 1):
-        for rows, columns in product(combinations(range(n), k), permutations(range(m), k)):
-            found.append(np.full(n, -1))
-            found[-1][list(rows)] = columns
-    return np.array(found)
+def _extents(environment):
+    """Sizes (N, 2) in m of the boxes, and their variances in m^2."""
+    sides = np.where(environment.assumed, _ASSUMED, _REACHED) ** 2
+    return environment.boxes[:, 2:] - environment.boxes[:, :2], sides[:, :2] + sides[:, 2:]
 
 
-def _search(x, y, price):
-    """A good partial matching of many objects: of the alignments that fit best, each refined.
+def _size_ratios(environment_i, environment_j):
+    extents, variances = zip(_extents(environment_i), _extents(environment_j), strict=True)
+    new_i, new_j = _as_new(extents, variances)
+    ratios = []
+    for axes in ([0, 1], [1, 0]):
+        same = _normal(extents[0][:, axes], extents[1], variances[0][:, axes], variances[1])
+        ratios.append(np.log(_MEASURED * same + _MISJUDGED * _ANY_SIZE) - (new_i[:, None] + new_j) / 2)
+    return np.array(ratios)
 
-    The margin is the exact one with turn and shift held at their best, or that to another alignment
-    where it is less.
+
+def _normal(one, other, variances_one, variances_other):
+    """(N, M) density of the difference between sizes (N, 2) and (M, 2), in 1/m^2."""
+    variances = variances_one[:, None] + variances_other
+    squares = (one[:, None] - other) ** 2 / variances
+    return np.exp(-squares.sum(axis=2) / 2) / (2 * pi * np.sqrt(variances.prod(axis=2)))
+
+
+def _as_new(extents, variances):
+    """Logarithmic densities g (N,), (M,) of the sizes, were each that of a new object.
+
+    It is like one of the others beside it, or any; how often which, the two environments tell.
     """
-    found = {}
-    for alignment in _alignments(x, y, price):
-        partners, cost, turn = _refine(x, y, price, *alignment)
-        found[partners.tobytes()] = (cost, partners, turn)
-    (cost, partners, turn), *others = sorted(found.values(), key=lambda result: result[0])
-    held = second_best(_moves(x, y, *_alignment(x, y, partners, turn)), partners, price)
-    return partners, cost, min([held, *(other[0] - cost for other in others)]), turn
+    like = [_like_others(*each) for each in zip(extents, variances, strict=True)]
+    beside = np.concatenate([each if len(each) > 1 else [] for each in like])
+    evidence = np.log(_ALIKE[:, None] * beside + (1 - _ALIKE[:, None]) * _ANY_SIZE).sum(axis=1)
+    alike = np.average(_ALIKE, weights=np.exp(evidence - evidence.max()))
+    across = _normal(*extents, *variances)
+    for k, each in enumerate(like):
+        if len(each) == 1:  # there are no others beside it
+            like[k] = across.mean(axis=1 - k)
+    return [np.log(alike * each + (1 - alike) * _ANY_SIZE) for each in like]
 
 
-def _alignments(x, y, price):
-    """Turns (by 45 degrees), pivots and shifts to start from: those that fit most objects."""
-    central = np.argsort(np.abs(x - x.mean()), kind="stable")
-    anchors, probes = x[central[: max(1, 100 // len(y))]], x[central[:_PROBES]]
-    turns = np.repeat(np.arange(-3, 5) * pi / 4, len(anchors) * len(y) + 1)
-    # Under a turn either the means coincide, or a central object falls on one of the others.
-    shifts = np.tile(np.r_[y.mean() - x.mean(), np.subtract.outer(y, anchors).ravel()], 8)
-    pivots = np.tile(np.r_[x.mean(), np.tile(anchors, len(y))], 8)
-    images = np.exp(1j * turns)[:, None] * (probes - pivots[:, None]) + (pivots + shifts)[:, None]
+def _like_others(extents, variances):
+    same = _normal(extents, extents, variances, variances)
+    return (same.sum(axis=1) - np.diag(same)) / max(len(extents) - 1, 1)
+
+
+def _count_weights(n, m, unseen_i=True, unseen_j=True):
+    """(K + 1,) log w_k for k = 0 ... K = min(N, M) pairs, as the module has it, but for a constant."""
+    k = np.arange(min(n, m) + 1)
+    p = _VISIBLE[:, None]
+    left_out = (n - k) * unseen_j + (m - k) * unseen_i
+    chances = left_out * np.log(1 - p) + k * (unseen_i + unseen_j) / 2 * np.log(p)
+    if unseen_i and unseen_j:
+        chances = chances - (n + m - k) * np.log(2 - p)
+    return scipy.special.gammaln(n + m - k) + np.logaddexp.reduce(chances, axis=0) - np.log(len(p))
+
+
+@dataclass(frozen=True, eq=False)
+class _Cases:
+    """H ways in which the one scene may have become the other; all but the turns logarithmic.
+
+    turns (H,), complex; counts (H, K + 1): the prior and w_k for k pairs; ratios (H, N, M): what a
+    pair has over leaving out both.
+    """
+
+    turns: np.ndarray
+    counts: np.ndarray
+    ratios: np.ndarray
+
+    def __getitem__(self, rows):
+        return _Cases(self.turns[rows], self.counts[rows], self.ratios[rows])
+
+
+def _cases(scene, turns, shifts, priors, free):
+    """The layouts (H,), each with small and large moves, few and many objects carried off; or put up anew."""
+    n, m = len(scene.x), len(scene.y)
+    images, origins = (
+        turns[:, None] * scene.x + shifts[:, None],
+        (scene.y - shifts[:, None]) / turns[:, None],
+    )
+    i, j = scene.environments
+    lost_i, over_i = _found(i, j, images * scene.moved, scene.moved)
+    lost_j, over_j = _found(j, i, origins * scene.moved, scene.moved)
+    counts = (priors + lost_i + lost_j)[:, None] + _count_weights(n, m, i.seen is None, j.seen is None)
+    others = scene.sizes[_quarters(turns)] + over_i[:, :, None] + over_j[:, None]
+    squares = np.abs(scene.y - images[:, :, None]) ** 2
+    near = {spread: _normal_at(squares, scene.blur + spread**2) * scene.area for spread in (0.0, *_SPREADS)}
+    ratios, known = [], []
+    for spread, still in product(_SPREADS, _STILL):
+        shifted = (1 - still) * near[spread] + still * near[0.0]
+        ratios.extend(np.log((1 - carried) * shifted + carried) + others for carried in _CARRIED)
+        # The less was moved, the better shift and turn are known.
+        room = free * np.log(np.sqrt(scene.blur.min()) if still else spread)
+        # Untouched though turned about its own middle: no frame of reference does that to a layout.
+        known.extend([np.where(still * (free == 1), -_NEVER, room)] * len(_CARRIED))
+    # Where things were put up anew, nobody knows how much of that was seen.
+    return _Cases(
+        np.append(1, np.tile(turns, len(known))),
+        np.vstack(
+            [
+                _count_weights(n, m) - _ANEW,
+                *(counts + each[:, None] - np.log(len(known)) for each in known),
+            ]
+        ),
+        np.concatenate([scene.sizes[:1], *ratios]),
+    )
+
+
+def _normal_at(squares, variances):
+    return np.exp(-squares / (2 * variances)) / (2 * pi * variances)
+
+
+def _found(environment, other, places, moved):
+    """Of objects that would stand at places (H, N) in the other one, in m, if what was seen is known there:
+
+    log q of all together (H,), and log sqrt(1 - q) / q of each (H, N).
+    """
+    if other.seen is None:
+        return np.zeros(len(places)), np.zeros(places.shape)
+    seen = other.seen
+    own = covered_cells(other.boxes, seen.origin, seen.resolution, seen.floor.shape)
+    seen = replace(seen, floor=seen.floor | own)
+    offsets = np.stack(np.meshgrid(_WHERETO, _WHERETO), axis=-1).reshape(-1, 2)
+    # A point of the box after the move is about normal.
+    extents = environment.boxes[:, 2:] - environment.boxes[:, :2]
+    spread = np.sqrt(moved**2 + extents**2 / 12)
+    middles = np.stack([places.real, places.imag], axis=-1)
+    found = seen.at(middles[:, :, None] + spread[:, None] * offsets).reshape(*places.shape, -1)
+    p = _FOUND * np.average(found, axis=2, weights=np.exp(-(offsets**2).sum(axis=1) / 2))
+    p = np.maximum(p, 1 - _FOUND)
+    return np.log(1 - p).sum(axis=1), np.log(p) / 2 - np.log(1 - p)
+
+
+# ---- how the layout lies as a whole
+
+
+def _alignments(scene):
+    """In place, and what fits best of all layouts that were moved as a whole: x at turns * x + shifts.
+
+    Turns, shifts, complex, their logarithmic priors with the room that they are uncertain by, and
+    how many of their numbers are free, each (H,).
+    """
+    turns, shifts, priors, free = (
+        np.ones(1, complex),
+        np.zeros(1, complex),
+        np.zeros(1),
+        np.zeros(1),
+    )
+    if min(len(scene.x), len(scene.y)) > 1:
+        found = _refined(scene, *_starts(scene))
+        placed = zip((turns, shifts, priors, free), found, strict=True)
+        turns, shifts, priors, free = (np.append(*each) for each in placed)
+    near = _near(scene, _central(scene.x), turns, shifts)
+    fits = np.log1p(near.sum(axis=2)).sum(axis=1) + priors
+    kept = fits > fits.max() - _HOPELESS
+    return turns[kept], shifts[kept], priors[kept], free[kept]
+
+
+def _starts(scene):
+    """Turns and shifts (H,) that bring most objects near others, pivots, and whether they may turn."""
+    circle = np.exp(1j * np.arange(8) * pi / 4)
+    shifted, turned = _fitting(scene, circle[:1]), _fitting(scene, circle)
+    free = np.full(len(shifted[0]) + len(turned[0]), np.nan)
+    pivots = np.repeat([scene.x.mean(), scene.y.mean()], 8)
+    about = np.tile(circle, 2), pivots * (1 - np.tile(circle, 2))
+    turns, shifts = (np.concatenate(each) for each in zip(shifted, turned, about, strict=True))
+    return turns, shifts, np.append(free, pivots), np.arange(len(turns)) >= len(shifted[0])
+
+
+def _fitting(scene, turns):
+    """Of turns (T,) about any place to any other those that bring most objects near others."""
+    x, y = scene.x, scene.y
+    anchors, probes = x[_central(x)[: max(3, 50 // len(y))]], x[_central(x)]
+    # Either the means coincide, or a central object falls on one of the others.
+    shifts = y[:, None, None] - np.multiply.outer(anchors, turns)
+    shifts = np.vstack([y.mean() - turns * x.mean(), shifts.reshape(-1, len(turns))])
+    images = np.multiply.outer(probes, turns)[:, None] + shifts
     tree = scipy.spatial.cKDTree(np.c_[y.real, y.imag])
     distances, _ = tree.query(np.stack([images.real, images.imag], axis=-1))
-    fits = np.minimum(distances**2 / 2, 2 * price).sum(axis=1)
-    chosen = np.argsort(fits, kind="stable")[:_STARTS]
-    best = zip(turns[chosen], pivots[chosen], shifts[chosen], strict=True)
-    return [(0.0, 0.0, 0.0), *best]  # in place, and those
+    fits = np.exp(-(distances**2) / 2).sum(axis=0).ravel()
+    chosen = np.argsort(-fits, kind="stable")[:_STARTS]
+    return turns[chosen % len(turns)], shifts.ravel()[chosen]
 
 
-def _refine(x, y, price, *alignment):
-    """Assignment and alignment by turns until neither changes.
+def _central(places):
+    """Some of the places, the central ones first."""
+    return np.argsort(np.abs(places - places.mean()), kind="stable")[:_PROBES]
 
-    Each step lowers the cost at the given shift.
+
+def _refined(scene, turns, shifts, pivots, turning):
+    """As `_alignments`, those that fit best near the given ones, each once."""
+    chosen, fixed = _central(scene.x), ~np.isnan(pivots)
+    x = scene.x[chosen]
+    for _ in range(_STEPS):
+        same = _same(_near(scene, chosen, turns, shifts))
+        middle_x = np.where(fixed, pivots, _means(x, same.sum(axis=2)))
+        middle_y = np.where(fixed, pivots, _means(scene.y, same.sum(axis=1)))
+        z, w = x - middle_x[:, None], scene.y - middle_y[:, None]
+        likeness = (z.conj() * np.matmul(same, w[..., None])[..., 0]).sum(axis=1)
+        turns = np.where(turning, np.exp(1j * np.angle(likeness)), turns)
+        shifts = middle_y - turns * middle_x
+    # How well shift and turn are known (Laplace), as shares of all that there are.
+    information = (same.sum(axis=2) * np.abs(z) ** 2).sum(axis=1)
+    turn_room = np.log(2 * pi * np.maximum(information, 1 / (2 * pi))) / 2
+    shift_room = np.log(np.maximum(same.sum(axis=(1, 2)) * scene.area / (2 * pi), 1.0))
+    turn_prior, shift_prior = (
+        -_TURNED - turn_room,
+        np.where(fixed, -np.log(2), -_SHIFTED - shift_room),
+    )  # of two pivots
+    kept = _distinct(turns[:, None] * x + shifts[:, None], turning + 2 * fixed * (1 + (pivots == pivots[-1])))
+    free = turning + 2.0 * ~fixed
+    return (
+        turns[kept],
+        shifts[kept],
+        (np.where(turning, turn_prior, 0.0) + shift_prior)[kept],
+        free[kept],
+    )
+
+
+def _near(scene, chosen, turns, shifts):
+    """(H, n, M) what it is worth that chosen objects are the same as others, near which they lie."""
+    images = turns[:, None] * scene.x[chosen] + shifts[:, None]
+    squares = np.abs(scene.y - images[:, :, None]) ** 2
+    return np.exp(scene.sizes[:, chosen][_quarters(turns)] - squares / 2) * scene.area / (2 * pi)
+
+
+def _same(near):
+    """(H, n, M) how surely each is the same as each, roughly."""
+    return near / np.sqrt((1 + near.sum(axis=2))[:, :, None] * (1 + near.sum(axis=1))[:, None])
+
+
+def _means(places, weights):
+    return weights @ places / np.maximum(weights.sum(axis=1), 1e-9)
+
+
+def _quarters(turns):
+    """Whether boxes lie turned by a right angle (1) or not (0)."""
+    return np.round(np.angle(turns) / (pi / 2)).astype(int) % 2
+
+
+def _distinct(images, families):
+    """Rows of images (H, N) that are not near an earlier one of the same family."""
+    kept = []
+    for row, (image, family) in enumerate(zip(images, families, strict=True)):
+        rivals = [other for other in kept if families[other] == family]
+        if not rivals or np.abs(images[rivals] - image).max(axis=1).min() > 0.5:
+            kept.append(row)
+    return kept
+
+
+def _that_count(cases):
+    """Those alone that may hold a share of the probability worth telling."""
+    step = np.diff(cases.counts[:, [0, -1]])[:, :, None] / (cases.counts.shape[1] - 1)
+    pairs = np.exp(cases.ratios + step)
+    bounds = [np.log1p(pairs.sum(axis=axis)).sum(axis=1) for axis in (1, 2)]
+    bound = cases.counts[:, 0] + np.minimum(*bounds)
+    return cases[bound > bound.max() - _NEGLIGIBLE]
+
+
+# ---- all matchings
+
+
+def _summed(cases):
+    """Logarithmic sum (H,) over all partial matchings, and the share (H, N, M) of it that has each pair.
+
+    Row by row, over the sets of columns that are taken; a set is a number, a bit for each column.
     """
-    previous = None
-    for _ in range(_REFINEMENTS):
-        partners = _assign(_moves(x, y, *alignment), price)
-        costs, turns = _costs_of(x, y, partners[None], price)
-        if np.array_equal(partners, previous):
-            break
-        previous, alignment = partners, _alignment(x, y, partners, turns[0])
-    return partners, costs[0], turns[0]
+    if cases.ratios.shape[2] > cases.ratios.shape[1]:
+        sums, marginals = _summed(replace(cases, ratios=cases.ratios.swapaxes(1, 2)))
+        return sums, marginals.swapaxes(1, 2)
+    pairs = np.moveaxis(np.exp(cases.ratios), 0, 2).copy()
+    n, m, h = pairs.shape
+    before = np.zeros((n + 1, 2**m, h))
+    before[0, 0] = 1
+    for row in range(n):
+        before[row + 1] = before[row]
+        for column in range(m):
+            free, taken = _by_column(before[row], column)[0], _by_column(before[row + 1], column)[1]
+            taken += pairs[row, column] * free
+    scale = cases.counts.max(axis=1)
+    after = np.exp(cases.counts - scale[:, None]).T[_bits(m)]
+    marginals = np.empty_like(pairs)
+    for row in reversed(range(n)):
+        later = after.copy()
+        for column in range(m):
+            taken = _by_column(later, column)[1] * pairs[row, column]
+            marginals[row, column] = np.einsum("abh,abh->h", _by_column(before[row], column)[0], taken)
+            after_free = _by_column(after, column)[0]
+            after_free += taken
+    return np.log(after[0]) + scale, np.moveaxis(marginals / after[0], 2, 0)
 
 
-def _assign(moves, price):
-    # A pair that costs more than leaving out both is assigned at that price, and dropped after.
-    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(moves, 2 * price))
-    near = moves[rows, columns] < 2 * price
-    partners = np.full(len(moves), -1)
-    partners[rows[near]] = columns[near]
+def _by_column(sets, column):
+    """Views of (2^M, H) values: of the sets without a column, and of the same ones with it."""
+    view = sets.reshape(-1, 2, 2**column, sets.shape[1])
+    return view[:, 0], view[:, 1]
+
+
+def _bits(m):
+    """(2^m,) int array: how many bits are set."""
+    sizes = np.zeros(1, int)
+    for _ in range(m):
+        sizes = np.append(sizes, sizes + 1)
+    return sizes
+
+
+def _best(cases, pairs):
+    """The most probable matching (N,), its logarithmic weight (H,) in each case, and the margin."""
+    steps, found = np.diff(cases.counts), [_assigned(pairs, -0.5)]
+    for ratios, step in zip(cases.ratios, steps, strict=True):
+        found.extend(_assigned(ratios, each) for each in {step[0], step[len(step) // 2], step[-1]})
+    found = np.unique(found, axis=0)
+    likely = _likelihoods(cases, found)
+    partners = found[np.logaddexp.reduce(likely, axis=1).argmax()]
+    if len(partners) <= _EXACT:
+        found = np.unique(np.vstack([found, _neighbours(partners, cases.ratios.shape[2])]), axis=0)
+        likely = _likelihoods(cases, found)
+    totals = np.logaddexp.reduce(likely, axis=1)
+    best, *others = np.argsort(-totals, kind="stable")
+    partners, h = found[best], likely[best].argmax()
+    margin = np.min(totals[best] - totals[others], initial=np.inf)
+    if len(partners) > _EXACT:
+        last = min(max(np.count_nonzero(partners >= 0) - 1, 0), steps.shape[1] - 1)
+        margin = min(margin, second_best(-cases.ratios[h] - steps[h, last], partners, 0.0))
+    return partners, likely[best], float(margin)
+
+
+def _neighbours(partners, m):
+    """All matchings (P, N) in which one object has no partner or a free one, or two have changed theirs."""
+    n, free = len(partners), np.setdiff1d(np.arange(m), partners)
+    others = []
+    for a, b in product(range(n), [-1, *free]):
+        others.append(partners.copy())
+        others[-1][a] = b
+    for pair in combinations(range(n), 2):
+        others.append(partners.copy())
+        others[-1][list(pair)] = partners[list(pair)][::-1]
+    return others
+
+
+def _assigned(ratios, step):
+    """The matching (N,) that has most, if each pair has its ratio and a step."""
+    costs = np.minimum(-ratios - step, 0.0)
+    rows, columns = scipy.optimize.linear_sum_assignment(costs)
+    partners = np.full(len(costs), -1)
+    used = costs[rows, columns] < 0
+    partners[rows[used]] = columns[used]
     return partners
 
 
-def _alignment(x, y, partners, turn):
-    matched = partners >= 0
-    if not matched.any():
-        return turn, 0, 0
-    pivot = x[matched].mean()
-    return turn, pivot, y[partners[matched]].mean() - pivot
+def _likelihoods(cases, found):
+    """Logarithmic weights (P, H) of matchings (P, N) in each case."""
+    ratios = np.pad(cases.ratios, ((0, 0), (0, 0), (0, 1)))  # -1 is the last column
+    pairs = ratios[:, np.arange(found.shape[1]), found].sum(axis=2)
+    return (cases.counts[:, np.count_nonzero(found >= 0, axis=1)] + pairs).T
 
 
-def _moves(x, y, turn, pivot, shift):
-    """(N, M) cost of the move that each pair would need beside turn and shift, in nats."""
-    images = np.exp(1j * turn) * (x - pivot) + pivot + shift
-    return np.abs(y - images[:, None]) ** 2 / 2
+# ---- crowds
+
+
+def _summed_in_parts(cases):
+    """As `_summed`, for many objects: by belief propagation, and exactly where few hang together.
+
+    One pair more changes the weight as it does about the number of pairs of the best matching.
+    """
+    sums, marginals = np.empty(len(cases.ratios)), np.empty_like(cases.ratios)
+    for row, (ratios, counts) in enumerate(zip(cases.ratios, cases.counts, strict=True)):
+        k = np.count_nonzero(_assigned(ratios, counts[-1] - counts[-2]) >= 0)
+        step = counts[max(k, 1)] - counts[max(k, 1) - 1]
+        sums[row], marginals[row] = _in_parts(np.exp(ratios + step))
+        sums[row] += counts[k] - k * step
+    return sums, marginals
+
+
+def _in_parts(pairs):
+    """Logarithmic sum over all matchings of weights (N, M), and the marginals (N, M)."""
+    marginals = _believed(pairs)
+    near = marginals > _RARE
+    far = np.where(near, 0.0, marginals).sum(axis=1)
+    total = -np.log1p(-np.minimum(far, 0.999)).sum()
+    for rows, columns in _parts(near):
+        part = np.ix_(rows, columns)
+        weights = np.log(np.where(near[part], pairs[part], 1e-300))
+        if min(weights.shape) <= _EXACT:
+            counts = np.zeros((1, min(weights.shape) + 1))
+            sums, shares = _summed(_Cases(np.ones(1), counts, weights[None]))
+            total, marginals[part] = total + sums[0], shares[0] * (1 - far[rows])[:, None]
+        else:
+            total += _at_least(weights, marginals[part])
+    return total, marginals
+
+
+def _at_least(weights, marginals):
+    """Logarithmic sum of a part, where the best matching is as probable as its marginals together.
+
+    Taken for independent they underrate what hangs together: so it is not sure too easily.
+    """
+    partners = _assigned(weights, 0.0)
+    said = np.column_stack([marginals, 1 - marginals.sum(axis=1)])[np.arange(len(partners)), partners]
+    used = partners >= 0
+    return weights[used, partners[used]].sum() - np.log(np.maximum(said, 1e-12)).sum()
+
+
+def _parts(near):
+    """Rows and columns (N, M) that pairs hold together, a list of two int arrays each."""
+    n, m = near.shape
+    rows, columns = np.nonzero(near)
+    graph = scipy.sparse.coo_array((np.ones(len(rows)), (rows, columns + n)), shape=(n + m, n + m))
+    _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    held = np.unique(label[rows])
+    return [(np.flatnonzero(label[:n] == each), np.flatnonzero(label[n:] == each)) for each in held]
+
+
+def _believed(pairs):
+    """Marginals (N, M) by belief propagation for matchings (Williams and Lau 2014).
+
+    It always converges, but what hangs together in circles comes out surer than it is.
+    """
+    back = np.ones_like(pairs)
+    for _ in range(_BELIEFS):
+        sent = pairs * back
+        there = pairs / (1 + sent.sum(axis=1, keepdims=True) - sent)
+        previous, back = back, 1 / (1 + there.sum(axis=0) - there)
+        if np.abs(back - previous).max() < 1e-6:
+            break
+    sent = pairs * back
+    return sent / (1 + sent.sum(axis=1, keepdims=True))
 
 
 def second_best(costs, partners, left_out=np.inf):

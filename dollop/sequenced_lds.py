@@ -4,20 +4,40 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dollop.checks import check_positive, checked_array
+from dollop.checks import check_choice, check_positive, checked_array
+from dollop.law.line import lines_of
+from dollop.law.timing import CORNER, Stands, shown_pauses, shown_profile, times_along, turns_at
 from dollop.lds import LDS
-from dollop.segmentation import best_segments, fewest_segments, raw_statistics, retimed_statistics, segment_errors
-from dollop.trajectory import align, arc_length, check_trajectories, check_trajectory, distance_to_polyline, resample
+from dollop.segmentation import (
+    best_segments,
+    fewest_segments,
+    raw_statistics,
+    retimed_statistics,
+    segment_errors,
+)
+from dollop.trajectory import (
+    align,
+    arc_length,
+    check_trajectories,
+    check_trajectory,
+    distance_to_polyline,
+    resample,
+)
 
 __all__ = ["SequencedLDS"]
 
 LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none would ever arrive
+REACH = 0.01  # m, to which lines are rolled out
+TURNED = np.radians(10)  # over two decimetres: on a radius of 1.1 m, which is no corner
+ROUNDS = 8  # how often a walk is divided anew: nearly always two are enough
 MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
 
 
 @dataclass(frozen=True, eq=False)
 class SequencedLDS:
     """A trajectory as a sequence of LDS, each handing over to the next at its subgoal (Sec. III).
+
+    All but the first three attributes are beyond the paper.
 
     Attributes
     ----------
@@ -27,11 +47,22 @@ class SequencedLDS:
         Where the demonstrations start on average, m.
     speeds : (K,) float array
         Mean demonstrated speed along each segment, m/s.
+    profile : (K, M) float array, optional
+        Speed in each of M equal parts of each segment's way, m/s, such that the time at the end of
+        each part is the demonstrated one; by default `speeds` all along.
+    pauses : (K + 1,) float array, optional
+        How long the demonstrators stood at the start and at each subgoal, s; by default not at all.
+    corners : (K,) bool array, optional
+        Whether a corner was shown at each subgoal, or a stop; elsewhere the direction of the
+        response is continuous. By default there is none.
     """
 
     segments: tuple
     start: np.ndarray
     speeds: np.ndarray
+    profile: np.ndarray | None = None
+    pauses: np.ndarray | None = None
+    corners: np.ndarray | None = None
 
     def __repr__(self):
         ends = self.start, self.subgoals[-1]
@@ -44,7 +75,15 @@ class SequencedLDS:
         return np.array([segment.goal for segment in self.segments])
 
     @classmethod
-    def fit(cls, trajectories, tolerance=0.02, n_segments=None, retimed=True, sample_period=0.1, candidates=100):
+    def fit(
+        cls,
+        trajectories,
+        tolerance=0.02,
+        n_segments=None,
+        retimed=True,
+        sample_period=0.1,
+        candidates=100,
+    ):
         """Divide a trajectory, or several walks of it, into segments of one LDS each (Sec. III).
 
         Several walks are aligned (`dollop.trajectory.align`); a subgoal is the mean of the places
@@ -89,18 +128,61 @@ class SequencedLDS:
         (1, array([[0., 1.]]))
         """
         check_search(tolerance, n_segments, sample_period, candidates)
-        walks = check_trajectories(trajectories)
+        stands = [Stands.of(walk, sample_period) for walk in check_trajectories(trajectories)]
+        walks = [each.walk for each in stands]
         aligned, shares = align(walks, 2 * candidates - 1)
         path, moments = aligned.mean(axis=0)[::2], cut_moments(walks, shares[:, ::2])
         statistics = retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
         errors = segment_errors(path, statistics)
-        exactly = n_segments is not None
-        cuts = best_segments(errors, n_segments) if exactly else fewest_segments(errors, tolerance)
-        spans = zip(cuts[:-1], np.diff(cuts), path[cuts[1:]], strict=True)
-        segments = tuple(LDS(statistics(start, length), goal) for start, length, goal in spans)
-        return cls(segments, path[0], demonstrated_speeds(walks, moments[:, cuts], sample_period))
+        pauses = shown_pauses(stands, shares[:, ::2], arc_length(path)[-1])
+        division = Division(path, statistics, errors, pauses)
+        cuts = division.exactly(n_segments) if n_segments is not None else division.within(tolerance)
+        at = moments[:, cuts]
+        law = cls(division.segments(cuts), path[0], demonstrated_speeds(walks, at, sample_period))
+        return law.with_timing(walks, at, sample_period, *division.stops(cuts))
 
-    def response(self, start=None, reach=0.01):
+    def with_timing(self, walks, moments, sample_period, pauses, corners):
+        """The same law with the timing and the corners of what it was fitted to.
+
+        Parameters
+        ----------
+        walks : sequence of D (N_k, 2) float arrays
+            Without their pauses, m.
+        moments : (D, K + 1) float array
+            Fractional sample numbers of the subgoals, the start first.
+        sample_period : float
+            s.
+        pauses : (K + 1,) float array
+            s.
+        corners : (K,) bool array
+            Whether one was shown.
+
+        Returns
+        -------
+        SequencedLDS
+        """
+        law = replace(self, pauses=pauses, corners=corners)
+        lengths = np.array([line.way[-1] for line in law.lines()])
+        return replace(law, profile=shown_profile(walks, moments, lengths, sample_period))
+
+    def lines(self, reach=0.01):
+        """What each segment keeps to: the response of its LDS from the subgoal before.
+
+        Rounded where two segments meet, unless a corner was shown there (`dollop.law.line`).
+
+        Parameters
+        ----------
+        reach : float
+            m, to which the responses are rolled out.
+
+        Returns
+        -------
+        list of K Line
+        """
+        corners = np.zeros(len(self.segments), bool) if self.corners is None else self.corners
+        return lines_of(self.segments, self.start, corners, reach)
+
+    def response(self, start=None, reach=0.01, method="held", segment=0):
         """Follow the segments, handing over to the next within reach of each subgoal (Sec. III).
 
         Since every LDS is stable, this happens after finitely many steps from any start. The next
@@ -112,6 +194,13 @@ class SequencedLDS:
             m; by default the demonstrations' start.
         reach : float
             m, at least a micrometre.
+        method : {"held", "paper"}
+            "held": near the response of a segment from the subgoal before, the offset from it fades
+            within decimetres, so that after a push the way is soon the shown one again; far from it
+            the LDS is alone; through a subgoal the direction is continuous (beyond the paper, as
+            stable: see `dollop.law.line`). "paper": every LDS alone.
+        segment : int
+            The first in force.
 
         Returns
         -------
@@ -121,7 +210,7 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            A start that is no position, or too small a reach.
+            A start that is no position, too small a reach, another method or segment.
 
         Examples
         --------
@@ -131,14 +220,113 @@ class SequencedLDS:
         >>> law = SequencedLDS.fit(np.hstack([np.cos(turn), np.sin(turn)]))
         >>> bool(np.linalg.norm(law.response([-30.0, 20.0])[-1] - law.subgoals[-1]) <= 0.01)
         True
+
+        Pushed outwards, it comes back to the arc:
+
+        >>> pushed = law.response([1.1, 0.5])
+        >>> bool(np.abs(np.hypot(*pushed[len(pushed) // 2 :].T) - 1).max() < 0.01)
+        True
+        """
+        return np.vstack(self.responses(start, reach, method, segment))
+
+    def responses(self, start=None, reach=0.01, method="held", segment=0):
+        """The response, segment by segment.
+
+        Parameters
+        ----------
+        start, reach, method, segment
+            See `response`; by default the start is where the segment sets out.
+
+        Returns
+        -------
+        list of (M_k, 2) float arrays
+            Of each segment from the first in force on, m; the first place of each follows on the
+            last of the one before. One may be empty.
+
+        Raises
+        ------
+        ValueError
+            As `response`.
+
+        Examples
+        --------
+        Each ends where it hands over:
+
+        >>> turn = np.linspace(0, 2 * np.pi, 100)[:, None]
+        >>> law = SequencedLDS.fit(np.hstack([np.cos(turn), np.sin(turn)]))
+        >>> ends = [response[-1] for response in law.responses()]
+        >>> np.allclose(ends, law.subgoals)
+        True
         """
         if not reach >= LEAST_REACH:
             raise ValueError(f"reach must be at least {LEAST_REACH:g} m, got {reach}")
-        states = [checked_array("start", self.start if start is None else start, 2)]
-        for segment in self.segments:
-            while np.linalg.norm(states[-1] - segment.goal) > reach:
-                states.append(segment.step(states[-1]))
-        return np.array(states)
+        check_choice("method", method, ("held", "paper"))
+        if segment not in range(len(self.segments)):
+            raise ValueError(f"segment must be 0 to {len(self.segments) - 1}, got {segment}")
+        if start is None:
+            start = np.vstack([self.start, self.subgoals])[segment]
+        place = checked_array("start", start, 2)
+        parts = (self._held if method == "held" else self._alone)(place, reach, segment)
+        return [part[1:] if k else part for k, part in enumerate(parts)]
+
+    def _held(self, place, reach, segment):
+        """The response from a place (2,) that comes back to the line of each segment."""
+        lines, parts = self.lines(reach)[segment:], []
+        for k, line in enumerate(lines):
+            places, offsets = line.follow(place, 0 if k else line.nearest(place), reach)
+            parts.append(places + offsets)
+            place = parts[-1][-1]
+        return parts
+
+    def _alone(self, place, reach, segment):
+        """The response from a place (2,) of every LDS alone."""
+        parts = []
+        for each in self.segments[segment:]:
+            states = [place]
+            while np.linalg.norm(states[-1] - each.goal) > reach:
+                states.append(each.step(states[-1]))
+            parts.append(np.array(states))
+            place = states[-1]
+        return parts
+
+    def timed(self, period=0.1):
+        """The response at equal times, at the shown speeds and with the shown pauses.
+
+        Beyond the paper.
+
+        Parameters
+        ----------
+        period : float
+            s.
+
+        Returns
+        -------
+        t : (N,) float array
+            From 0 on, s; at the last the task is done.
+        positions : (N, 2) float array
+            m.
+
+        Raises
+        ------
+        ValueError
+            A period that is not positive.
+
+        Examples
+        --------
+        Two metres at a metre per second, half a second at half of it, and a stop for two seconds:
+
+        >>> x = np.concatenate([np.arange(0, 2, 0.1), np.arange(2, 2.25, 0.05), [2.25] * 21])
+        >>> law = SequencedLDS.fit(np.column_stack([x, np.zeros_like(x)]))
+        >>> t, positions = law.timed()
+        >>> bool(np.abs(positions[:, 0] - x[: len(t)]).max() < 0.05), float(t[-1].round(1))
+        (True, 4.5)
+        """
+        check_positive("period", period)
+        speeds = np.asarray(self.speeds, float)[:, None] if self.profile is None else self.profile
+        pauses = np.zeros(len(self.segments) + 1) if self.pauses is None else self.pauses
+        when, places = times_along([line.places for line in self.lines()], speeds, pauses)
+        t = period * np.arange(int(np.ceil(when[-1] / period - 1e-9)) + 1)
+        return t, np.stack([np.interp(t, when, column) for column in places.T], axis=1)
 
     def error(self, trajectory):
         """Mean distance of a trajectory's samples to the response.
@@ -190,7 +378,11 @@ class SequencedLDS:
         samples, response = check_trajectory(trajectory), self.response()
         there = distance_to_polyline(samples, response)
         back = distance_to_polyline(resample(response, len(samples)), samples)
-        return {"mean": float(there.mean()), "max": float(there.max()), "reverse": float(back.mean())}
+        return {
+            "mean": float(there.mean()),
+            "max": float(there.max()),
+            "reverse": float(back.mean()),
+        }
 
     def with_subgoals(self, subgoals, start=None, turned=False):
         """The same task with its subgoals moved (Sec. IV).
@@ -251,6 +443,107 @@ def check_search(tolerance, n_segments, sample_period, candidates):
     if n_segments is not None and n_segments not in range(1, most + 1):
         rule = f"n_segments must be a whole number from 1 to {most} (half the candidates)"
         raise ValueError(f"{rule}, got {n_segments}")
+
+
+@dataclass(frozen=True, eq=False)
+class Division:
+    """What is needed to divide a walk into segments.
+
+    Attributes
+    ----------
+    path : (C, 2) float array
+        The walks' mean at the candidate cuts, m.
+    statistics : callable
+        (start, length) -> Statistics.
+    errors : (C, C) float array
+        From `segment_errors`, m.
+    pauses : dict of int to float
+        Seconds stood, by candidate cut.
+    """
+
+    path: np.ndarray
+    statistics: object
+    errors: np.ndarray
+    pauses: dict
+
+    def within(self, tolerance):
+        """Cuts (S + 1,) of the fewest segments within a tolerance in m, as they are and rounded.
+
+        Where the segments' lines, rounded as they are where they meet, leave the path by more on
+        the mean, those that do are refused, and so is one that turns at its end by 10 degrees more
+        than the path; with them those like them. Then the walk is divided anew. Where that never
+        ends, the division with the least excess is taken.
+        """
+        errors, tried = self._cut(self.errors, list(self.pauses)), []
+        while len(tried) < ROUNDS:
+            try:
+                cuts = fewest_segments(errors, tolerance)
+            except ValueError:
+                if not tried:
+                    raise
+                break
+            excess = self.excess(cuts, tolerance)
+            tried.append((excess.max(), cuts))
+            if excess.max() <= 1:
+                break
+            for k in np.flatnonzero(excess > 1):
+                rows, columns = (slice(max(each - 1, 0), each + 2) for each in cuts[k : k + 2])
+                errors[rows, columns] = np.inf
+        return min(tried, key=lambda each: each[0])[1]
+
+    def exactly(self, n_segments):
+        """Cuts (S + 1,) of so many segments with the least total error.
+
+        The longest pauses have the say where not all of them leave room for the segments.
+        """
+        required = sorted(self.pauses, key=self.pauses.get)
+        required = required[max(len(required) - n_segments + 1, 0) :]
+        while True:
+            cuts = best_segments(self._cut(self.errors, required), n_segments)
+            if cuts is not None or not required:
+                return cuts
+            required = required[1:]
+
+    def _cut(self, errors, required):
+        """Errors (C, C) of the segments that have none of some cuts within; both ends count for it."""
+        kept = errors.copy()
+        for cut in required:
+            if 2 <= cut <= len(errors) - 3:
+                kept[:cut, cut + 1 :] = np.inf
+        return kept
+
+    def segments(self, cuts):
+        """The LDS of each segment, for cuts (S + 1,)."""
+        spans = zip(cuts[:-1], np.diff(cuts), self.path[cuts[1:]], strict=True)
+        return tuple(LDS(self.statistics(start, length), goal) for start, length, goal in spans)
+
+    def stops(self, cuts):
+        """Seconds stood at each cut (S + 1,), and whether there is a corner or a stop at each end (S,)."""
+        seconds = np.zeros(len(cuts))
+        for cut, pause in self.pauses.items():
+            seconds[np.abs(cuts - cut).argmin()] += pause
+        return seconds, (self.turns(cuts) > CORNER) | (seconds[1:] > 0)
+
+    def turns(self, cuts):
+        """How far (S,) in rad the path turns at the end of each segment, for cuts (S + 1,)."""
+        return turns_at(self.path, arc_length(self.path)[cuts[1:]])
+
+    def excess(self, cuts, tolerance):
+        """How far (S,) each segment's rounded line is beside the path, and turns at its end too far.
+
+        In units of the tolerance in m and of 10 degrees, the larger of both. While the mean over
+        the whole path is within the tolerance, no segment is beside it too far.
+        """
+        corners = self.stops(cuts)[1]
+        lines = lines_of(self.segments(cuts), self.path[0], corners, REACH)
+        spans = zip(cuts[:-1], cuts[1:], lines, strict=True)
+        beside = [distance_to_polyline(self.path[i + 1 : j], line.places) for i, j, line in spans]
+        total = np.concatenate(beside).mean() / tolerance
+        each = np.array(list(map(np.mean, beside))) / tolerance
+        whole = np.vstack([line.places for line in lines])
+        turns = turns_at(whole, np.cumsum([line.way[-1] for line in lines]))
+        turned = np.where(corners, 0, turns - self.turns(cuts)) / TURNED
+        return np.maximum(np.where(total > 1, each, np.minimum(each, 1)), turned)
 
 
 def cut_moments(walks, shares):

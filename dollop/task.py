@@ -1,26 +1,25 @@
 """Tasks: learned from demonstrations, adapted to moved objects, saved (Sec. IV-B and V)."""
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, pairwise
 
 import numpy as np
 
-from dollop.association import Association, Frames, associate, associate_with_frames
-from dollop.cdhmm import SubgoalHMM
-from dollop.checks import check_positive, checked_array
+from dollop.association import Association, associate, layout_turn
+from dollop.checks import check_choice, put_in
 from dollop.environment import Environment
-from dollop.formats.files import FormatError, read_bytes, whole_file
+from dollop.formats.files import whole_file
 from dollop.laps import cut_laps
-from dollop.lds import LDS, Statistics
-from dollop.matching import match_confidently
+from dollop.learning.anchored import learn_anchored, tied_to_corners, told_of_places
+from dollop.learning.matchings import composed, inverse, matched_to, matchings_into, notes_of
+from dollop.learning.paper import anchors, learn_as_paper
+from dollop.learning.saving import as_dict, read_task
+from dollop.matching import Matching
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import check_trajectories
 
-__all__ = ["Demonstration", "Task", "anchors", "learn", "members_along"]
-
-FORMAT, VERSION = "dollop task", 1
+__all__ = ["Demonstration", "Task", "learn"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +38,7 @@ class Demonstration:
     tolerance : float
         Largest mean error of a segment in m, see `SequencedLDS.fit`.
     notes : tuple of Note
-        What somebody who learns from it must know. They are not saved.
+        What somebody who learns from it must know.
 
     Raises
     ------
@@ -57,7 +56,7 @@ class Demonstration:
         check_trajectories(self.trajectory)
 
     def __repr__(self):
-        return f"Demonstration, walked {len(check_trajectories(self.trajectory))} x; {self.environment}"
+        return f"Demonstration, walked {len(self.walks)} x; {self.environment}"
 
     @classmethod
     def of(cls, observation, tolerance=0.02):
@@ -89,6 +88,11 @@ class Demonstration:
         return cls(cut.laps, observation.environment, period, tolerance, notes)
 
     @cached_property
+    def walks(self):
+        """The walks as a list of (N_k, 2) float arrays, in m."""
+        return check_trajectories(self.trajectory)
+
+    @cached_property
     def law(self):
         """Sequenced LDS of the walk (Sec. III)."""
         return SequencedLDS.fit(self.trajectory, self.tolerance, sample_period=self.sample_period)
@@ -101,7 +105,7 @@ class Task:
     Attributes
     ----------
     law : SequencedLDS
-        The control law in this environment.
+        The control law in this environment: the way that was shown most often.
     environment : Environment
         Where the objects stand.
     association : Association
@@ -112,40 +116,66 @@ class Task:
     demonstrations : tuple of Demonstration
         What the task was learned from, so that more can be added.
     notes : tuple of Note
-        Those of its demonstrations, none twice. They are not saved.
+        What is in doubt: of the demonstrations, of what they had in common, and of where the
+        objects went; none twice.
+    ways : tuple of SequencedLDS
+        The laws of all ways in which the task was shown, that of `law` first.
+    shown : tuple of int
+        How often each way was shown.
+    partners : tuple of (int array or None)
+        For each demonstration which of the N objects that were learned from each of its objects is,
+        -1 for none; None for a demonstration that was set aside.
+    objects : (N,) int array
+        Which object of the environment each of those is, -1 where it is gone.
+    learned : tuple of Way
+        The ways as they were learned; none where the task was learned by method "paper".
     """
 
     law: SequencedLDS
     environment: Environment
     association: Association
-    model: SubgoalHMM = None
+    model: object = None
     demonstrations: tuple = ()
     notes: tuple = ()
+    ways: tuple = ()
+    shown: tuple = ()
+    partners: tuple = ()
+    objects: np.ndarray = None
+    learned: tuple = ()
+
+    def __post_init__(self):
+        objects = np.arange(len(self.environment)) if self.objects is None else self.objects
+        shown = self.shown or (len(self.demonstrations),)
+        put_in(self, ways=self.ways or (self.law,), shown=shown, objects=objects)
 
     def __repr__(self):
         shown, subgoals = len(self.demonstrations), len(self.law.segments)
-        return f"Task of {subgoals} subgoals, shown {shown} x; {self.environment}"
+        ways = f" in {len(self.ways)} ways" if len(self.ways) > 1 else ""
+        return f"Task of {subgoals} subgoals, shown {shown} x{ways}; {self.environment}"
 
     @classmethod
-    def of(cls, demonstration):
+    def of(cls, demonstration, method="anchored"):
         """The task as one demonstration shows it (Sec. IV-B).
 
-        Every place is tied to all corners, the near ones strongly, so that it has others to hold on
+        Every place is tied to all objects, the near ones strongly, so that it has others to hold on
         to when an object is gone.
 
         Parameters
         ----------
         demonstration : Demonstration
+        method : {"anchored", "paper"}
+            As for `learn`.
 
         Returns
         -------
         Task
-            In the environment of the demonstration.
+            In the environment of the demonstration, without a model.
 
         Raises
         ------
         ValueError
-            An environment without objects, or a walk that cannot be segmented at its tolerance.
+            A walk that cannot be segmented at its tolerance; by the paper's method an environment
+            without objects.
 
         Examples
         --------
@@ -156,48 +186,61 @@ class Task:
         >>> walk = np.stack([2 + np.cos(angle), np.sin(angle)], axis=1)
         >>> task = Task.of(Demonstration(walk, Environment(boxes)))
         >>> moved = task.adapt(Environment(boxes + [0.5, 2.0, 0.5, 2.0]))
-        >>> bool(np.allclose(moved.law.response(), task.law.response() + [0.5, 2.0]))
+        >>> bool(np.allclose(moved.law.response(), task.law.response() + [0.5, 2.0], atol=1e-6))
         True
         """
-        law, environment = demonstration.law, demonstration.environment
-        association = associate(anchors(law), environment, m=len(environment.corners))
-        shown = (demonstration,)
-        return cls(law, environment, association, demonstrations=shown, notes=notes_of(shown))
+        check_choice("method", method, METHODS)
+        environment, shown = demonstration.environment, (demonstration,)
+        partners = (np.arange(len(environment)),)
+        if method == "paper":
+            law = demonstration.law
+            tied = associate(anchors(law), environment, m=max(1, len(environment.corners)))
+            return cls(law, environment, tied, None, shown, notes_of(shown), partners=partners)
+        ways, _, notes = learn_anchored(shown, partners, environment, merged=False)
+        blank = cls(None, environment, None, None, shown, (*notes_of(shown), *notes), partners=partners, learned=ways)
+        return _laid_out(blank, environment, blank.objects)
 
-    def add(self, demonstration, spread=0.15):
+    def add(self, demonstration, spread=None, matching=None):
         """The task learned from all demonstrations so far and one more (Sec. V).
 
         Parameters
         ----------
         demonstration : Demonstration
-        spread : float
+        spread : float, optional
             As for `learn`.
+        matching : Matching, optional
+            From its environment to this task's; found when not given.
 
         Returns
         -------
         Task
-            In this task's environment.
+            In this task's environment, by the same method.
 
         Raises
         ------
         ValueError
             As `learn`.
         """
-        return learn([*self.demonstrations, demonstration], self.environment, spread)
+        known = [None if goes is None else Matching.of_partners(composed(goes, self.objects)) for goes in self.partners]
+        known += [None] * (len(self.demonstrations) - len(known))
+        shown, method = [*self.demonstrations, demonstration], "anchored" if self.learned else "paper"
+        return learn(shown, self.environment, [*known, matching], method, spread)
 
     def adapt(self, environment, matching=None, turned=False):
         """The task where the objects stand now (Sec. IV-B).
 
-        Its subgoals move, and each LDS adapts by itself.
+        Its places move with the objects that they follow, and the law is what is fitted to them;
+        by the paper's method its subgoals move, and each LDS adapts by itself.
 
         Parameters
         ----------
         environment : Environment
             The objects now.
         matching : Matching, optional
-            From the task's environment to this one; found by `match` when not given.
+            From the task's environment to this one; found by `match` when not given. Pairs of which
+            `match` is not sure are not used, and named in the notes.
         turned : bool
-            Beyond the paper: turn the differences from the objects, and each LDS, with the layout.
+            Beyond the paper: turn the differences from the objects with the layout.
 
         Returns
         -------
@@ -206,14 +249,49 @@ class Task:
         Raises
         ------
         ValueError
-            If the environments cannot be matched with confidence; the margin is named.
+            If no object can be matched with confidence, if a given matching belongs to others, or
+            if a place follows nothing that is left.
         """
         names = "the task's environment", "the new one"
-        matching = matching or match_confidently(self.environment, environment, names)
-        start, *subgoals = self.association.relocate(environment, matching, turned)
-        law = self.law.with_subgoals(subgoals, start, turned)
-        tied = self.association.carried(environment, matching)
-        return replace(self, law=law, environment=environment, association=tied)
+        matching, notes = matched_to(self.environment, environment, matching, names)
+        objects = composed(self.objects, matching.partners)
+        told = tuple(dict.fromkeys((*self.notes, *notes)))
+        if not self.learned:
+            start, *subgoals = self.association.relocate(environment, matching, turned)
+            law = self.law.with_subgoals(subgoals, start, turned)
+            tied = self.association.carried(environment, matching)
+            return replace(
+                self, law=law, environment=environment, association=tied, notes=told, ways=(law,), objects=objects
+            )
+        turn = layout_turn_of(self.environment, environment, matching) if turned else 0.0
+        return _laid_out(replace(self, notes=told), environment, objects, turn)
+
+    def errors(self):
+        """How far the task is from what each demonstration showed, in its own environment.
+
+        Returns
+        -------
+        (D,) float array
+            Mean distance in m from the walks of each demonstration to the response of the task,
+            adapted to where the objects stood for it, along the way that it was found to go; nan for
+            one that was set aside.
+        """
+        return np.array([self._error(k) for k in range(len(self.demonstrations))])
+
+    def _error(self, k):
+        shown, partners = self.demonstrations[k], self.partners[k] if k < len(self.partners) else None
+        if not self.learned:
+            names, given = ("the task's environment", f"that of demonstration {k}"), None
+            if partners is not None:
+                given = Matching.of_partners(inverse(composed(partners, self.objects), len(self.environment)))
+            matching, _ = matched_to(self.environment, shown.environment, given, names)
+            law = self.adapt(shown.environment, matching).law
+        elif partners is None:
+            return np.nan
+        else:
+            way = next(each for each in self.learned if k in each.members)
+            law, _ = way.law(way.among(shown.environment, partners))
+        return float(np.mean([law.error(walk) for walk in shown.walks]))
 
     def save(self, path):
         """Write the task as JSON, whole or not at all (a format of this library's own).
@@ -247,103 +325,50 @@ class Task:
         Raises
         ------
         FormatError
-            For a file that is damaged, not a task, or of another version.
+            For a file that is damaged, not a task, of another version, or whose numbers contradict
+            each other.
         """
-        try:
-            content = json.loads(read_bytes(path))
-        except (ValueError, RecursionError) as error:
-            raise FormatError(f"not a task: {error}", path) from error
-        if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise FormatError(f"not a task: format must be {FORMAT!r}", path)
-        if content.get("version") is not VERSION:
-            raise FormatError(f"version must be {VERSION}, got {content.get('version')!r}", path)
-        try:
-            return from_dict(content)
-        except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
-            raise FormatError(f"a damaged task: {type(error).__name__} {error}", path) from error
+        return read_task(path, cls, Demonstration, _laid_out)
 
 
-def anchors(law):
-    """The places of a law that move with objects: its start and its subgoals (Sec. IV-B).
-
-    Parameters
-    ----------
-    law : SequencedLDS
-        Of K segments.
-
-    Returns
-    -------
-    (K + 1, 2) float array
-        In m.
-    """
-    return np.vstack([law.start, law.subgoals])
-
-
-def as_dict(task):
-    """What is saved of a task: names to numbers, lists and arrays, of which JSON makes lists."""
-    law, tied = task.law, task.association
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "boxes": task.environment.boxes,
-        "start": law.start,
-        "speeds": law.speeds,
-        "segments": [{"goal": each.goal, **asdict(each.statistics)} for each in law.segments],
-        "association": {name: getattr(tied, name) for name in ("corners", "weights", "differences")},
-        "demonstrations": [
-            {
-                "walks": check_trajectories(each.trajectory),
-                "boxes": each.environment.boxes,
-                "sample_period": each.sample_period,
-                "tolerance": each.tolerance,
-            }
-            for each in task.demonstrations
-        ],
-    }
+def _laid_out(task, environment, objects, turn=0.0):
+    """A task of ways that were learned, where the objects stand in an environment."""
+    partners = inverse(objects, len(environment))
+    placed = [way.among(environment, partners, turn) for way in task.learned]
+    laws, kept = zip(*(way.law(now) for way, now in zip(task.learned, placed, strict=True)), strict=True)
+    tied = tied_to_corners(task.learned[0], placed[0], laws[0], environment, objects)
+    shown = tuple(len(way.members) for way in task.learned)
+    told = told_of_places(task.learned, kept, partners)
+    return replace(
+        task,
+        law=laws[0],
+        environment=environment,
+        association=tied,
+        ways=laws,
+        shown=shown,
+        objects=objects,
+        notes=tuple(dict.fromkeys((*task.notes, *told))),
+    )
 
 
-def from_dict(content):
-    """A task from what JSON makes of `as_dict`; ValueError where its parts do not fit together."""
-    environment, segments = Environment(content["boxes"]), content["segments"]
-    check_positive("the number of segments", len(segments))
-    start = checked_array("start", content["start"], 2)
-    speeds = checked_array("speeds", content["speeds"], len(segments))
-    check_positive("speeds", speeds.min())
-    law = SequencedLDS(tuple(map(segment_from, segments)), start, speeds)
-    association = association_from(content["association"], environment, len(segments) + 1)
-    shown = tuple(map(demonstration_from, content["demonstrations"]))
-    return Task(law, environment, association, demonstrations=shown)
+def layout_turn_of(before, after, matching):
+    """By how much a layout has turned, in rad."""
+    matched = matching.indices >= 0
+    return layout_turn(before.corners[matched], after.corners[matching.indices[matched]])
 
 
-def segment_from(content):
-    """A saved LDS."""
-    G0, G1 = (checked_array(name, content[name], 2, 2) for name in ("G0", "G1"))
-    return LDS(Statistics(G0, G1), content["goal"])
+METHODS = ("anchored", "paper")
 
 
-def association_from(content, environment, places):
-    """The saved association of so many places with the corners of an environment."""
-    corners = checked_array("corners", content["corners"], places, "m").astype(int)
-    weights = checked_array("weights", content["weights"], *corners.shape)
-    differences = checked_array("differences", content["differences"], *corners.shape, 2)
-    if not 0 <= corners.min() <= corners.max() < len(environment.corners):
-        raise ValueError(f"corners must be 0 to {len(environment.corners) - 1}")
-    check_positive("weights", weights.min(), or_zero=True)
-    return Association(environment, corners, weights, differences)
-
-
-def demonstration_from(content):
-    """A saved demonstration."""
-    walks, environment = check_trajectories(content["walks"]), Environment(content["boxes"])
-    return Demonstration(walks, environment, content["sample_period"], content["tolerance"])
-
-
-def learn(demonstrations, environment=None, spread=0.15):
+def learn(demonstrations, environment=None, matchings=None, method="anchored", spread=None):
     """Learn a task from demonstrations in different environments (Sec. V).
 
-    Every demonstration is segmented and mapped to one environment by matching and association; a
-    CDHMM is estimated from all subgoals by merging; its most-likely path is the task, and segments
-    merged along an edge share one LDS.
+    "anchored": which object each place of the task follows is told from all demonstrations
+    together, from closeness and from the evidence that the place has the same offset from that
+    object in each; demonstrations that go other ways are kept as other ways, and what one lacks at
+    its beginning or end is learned from the others. "paper": every demonstration is mapped to one
+    environment by closeness, a CDHMM is estimated from all subgoals by merging, and its
+    most-likely path is the task.
 
     Parameters
     ----------
@@ -351,135 +376,41 @@ def learn(demonstrations, environment=None, spread=0.15):
         One at least; one alone is the task.
     environment : Environment, optional
         The environment to learn in; that of the first demonstration by default.
-    spread : float
+    matchings : sequence of (Matching or None), optional
+        One for each demonstration, from its environment to the one to learn in; None where it is to
+        be found.
+    method : {"anchored", "paper"}
+    spread : float, optional
         How far the subgoal of one demonstration is expected to lie from its mean, standard
-        deviation in m.
+        deviation in m; estimated when not given.
 
     Returns
     -------
     Task
-        In that environment; `.model` is the CDHMM, whose `.outliers()` are demonstrations of
-        something else.
+        In that environment; `.model` is the CDHMM. `.notes` names every demonstration that was set
+        aside because its environment cannot be matched, that shows only a part, that goes another
+        way, or that the task misses.
 
     Raises
     ------
     ValueError
-        No demonstration; one whose environment cannot be matched with confidence, named with the
-        margin; or one that cannot be segmented at its tolerance.
+        No demonstration; matchings that do not belong; none whose environment can be matched with
+        confidence; one that cannot be segmented at its tolerance; or, by the paper's method, an
+        environment without objects.
     """
+    check_choice("method", method, METHODS)
     demonstrations = tuple(demonstrations)
     if not demonstrations:
         raise ValueError("learning needs at least one demonstration, got none")
     environment = demonstrations[0].environment if environment is None else environment
-    mapped = [mapped_to(environment, shown, k) for k, shown in enumerate(demonstrations)]
-    laws, centres = zip(*mapped, strict=True)
-    model = SubgoalHMM.fit([law.subgoals for law in laws], spread)
-    members = members_along(model)
-    association = tie_to_objects(environment, demonstrations, centres, members)
-    law = shared_law(laws, members, association.relocate(environment))
-    return Task(law, environment, association, model, demonstrations, notes_of(demonstrations))
-
-
-def notes_of(demonstrations):
-    """The notes of all demonstrations in order, none twice, as a tuple."""
-    return tuple(dict.fromkeys(chain.from_iterable(shown.notes for shown in demonstrations)))
-
-
-def mapped_to(environment, demonstration, number):
-    """The law of a demonstration in the environment to learn in, and where its objects stood.
-
-    That is (N, 2) centres in m in the order of the environment, nan for an object that was not
-    there.
-    """
-    names = f"demonstration {number}", "the one to learn in"
-    try:
-        task = Task.of(demonstration)
-    except ValueError as error:
-        raise ValueError(f"{names[0]}: {error}") from error
-    matching = match_confidently(task.environment, environment, names)
-    centres, partners = np.full((len(environment), 2), np.nan), matching.partners
-    centres[partners[partners >= 0]] = task.environment.centres[partners >= 0]
-    return task.adapt(environment, matching).law, centres
-
-
-def members_along(model):
-    """Which segments of which demonstrations run along each edge of the most-likely path (Sec. V).
-
-    Parameters
-    ----------
-    model : SubgoalHMM
-
-    Returns
-    -------
-    list of K lists of (demonstration, segment)
-        From the start on.
-    """
-    path, segments = model.most_likely_path().tolist(), model.segments()
-    return [segments[edge] for edge in pairwise([-1, *path])]
-
-
-def shared_law(laws, members, places):
-    """One LDS for all segments that run along the same edge of the most-likely path (Sec. V).
-
-    Parameters
-    ----------
-    laws : sequence of SequencedLDS
-        Of each demonstration.
-    members : list of K lists of (demonstration, segment)
-    places : (K + 1, 2) float array
-        Where the law is to start, and its subgoals, m.
-
-    Returns
-    -------
-    SequencedLDS
-        Of K segments.
-    """
-    segments, speeds = [], []
-    for shared, goal in zip(members, places[1:], strict=True):
-        first, *others = [laws[d].segments[i].statistics for d, i in shared]
-        segments.append(LDS(sum(others, first), goal))
-        speeds.append(np.mean([laws[d].speeds[i] for d, i in shared]))
-    return SequencedLDS(tuple(segments), places[0], np.array(speeds))
-
-
-def tie_to_objects(environment, demonstrations, centres, members):
-    """Association of start and subgoals with objects, by closeness and by how little they vary.
-
-    Each place is seen from the objects as they stood in every demonstration that went there.
-
-    Parameters
-    ----------
-    environment : Environment
-        N objects, the one to learn in.
-    demonstrations : sequence of Demonstration
-    centres : sequence of (N, 2) float arrays
-        Where these objects stood in each demonstration, in m.
-    members : list of K lists of (demonstration, segment)
-        Which segments end in each subgoal.
-
-    Returns
-    -------
-    Association
-        Of K + 1 places.
-    """
-    demonstrated = [anchors(shown.law) for shown in demonstrations]
-    starts = [(d, -1) for d, i in members[0] if i == 0] or [(0, -1)]
-    ties = [tie(environment, demonstrated, centres, seen) for seen in (starts, *members)]
-    corners = np.tile(np.arange(4 * len(environment)), (len(ties), 1))
-    return Association(environment, corners, *map(np.stack, zip(*ties, strict=True)))
-
-
-def tie(environment, demonstrated, centres, seen):
-    """Weights (4N,) and differences (4N, 2) to all corners of one place.
-
-    It is where `seen`, segments as (demonstration, segment), end; the start is where segment -1
-    does.
-    """
-    places = [[demonstrated[d][i + 1]] for d, i in seen]
-    stood = np.array([centres[d] for d, _ in seen])
-    common = np.isfinite(stood[..., 0]).all(axis=0)
-    frames = [Frames(each[common], np.zeros(common.sum())) for each in stood]
-    found = associate_with_frames(places, frames)
-    weights, local = np.zeros(len(environment)), np.zeros((len(environment), 2))
-    weights[common], local[common] = found.weights[:, 0], found.local[:, 0]
-    return np.repeat(weights / 4, 4), np.repeat(local, 4, axis=0) - environment.corner_offsets
+    found, aside = matchings_into(environment, demonstrations, matchings)
+    partners = tuple(None if each is None else each.partners for each in found)
+    used = [k for k, each in enumerate(found) if each is not None]
+    notes = (*notes_of(demonstrations), *aside)
+    if method == "paper":
+        shown = [demonstrations[k] for k in used]
+        law, tied, model = learn_as_paper(shown, [found[k] for k in used], environment, spread)
+        return Task(law, environment, tied, model, demonstrations, notes, partners=partners)
+    ways, model, told = learn_anchored(demonstrations, partners, environment, spread=spread)
+    blank = Task(None, environment, None, model, demonstrations, (*notes, *told), partners=partners, learned=ways)
+    return _laid_out(blank, environment, blank.objects)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dollop import Demonstration, Environment, FormatError, Task, learn, match
 from dollop.checks import Note
-from dollop.task import anchors, members_along
+from dollop.learning.paper import anchors, members_along
 
 CANS = np.array([[2.3, 3.4, 2.7, 3.8], [6.3, 3.4, 6.7, 3.8]])
 THREE = np.vstack([CANS, [4.0, 1.0, 4.4, 1.4]])

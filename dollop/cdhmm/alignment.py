@@ -39,11 +39,28 @@ def _emission_gains(graph, points, prior):
     return emission_evidence(n, s, q_with, prior) - before, emission_evidence(one, points, q, prior)
 
 
-def _edge_gains(counts):
-    """What one more step adds to the evidence: along each edge (S, S), and along a new one (S,)."""
-    out, total = np.maximum((counts > 0).sum(1), 1), counts.sum(1)
-    new = np.where(total > 0, np.log(out) - np.log(out + total) - np.log(out + total + 1), 0.0)
-    return np.where(counts > 0, np.log(counts + 1) - np.log(out + total)[:, None], new[:, None]), new
+def edge_gains(into):
+    """What one more step adds to the evidence, along each edge and along a new one (Sec. V).
+
+    Parameters
+    ----------
+    into : (S, S) int array
+        How often each edge was taken, to row from column.
+
+    Returns
+    -------
+    after, before : (E,) int arrays
+        The nodes of each edge, those to one node together.
+    along : (E,) float array
+        In nats.
+    anew : (S,) float array
+        Along a new edge from each node, in nats.
+    """
+    out, total = np.maximum(np.count_nonzero(into, axis=0), 1), into.sum(0)
+    anew = np.where(total > 0, np.log(out) - np.log(out + total) - np.log(out + total + 1), 0.0)
+    after, before = into.nonzero()
+    along = np.log(into[after, before] + 1) - np.log(out + total)[before]
+    return after, before, along, anew
 
 
 def align_chain(points, graph, labels, chains):
@@ -73,50 +90,75 @@ def align_chain(points, graph, labels, chains):
     gain : float
         Of evidence, in nats.
     """
-    order = np.array(topological_order(graph.counts, _mean_place(labels, chains, len(graph.n))))
+    order = np.array(topological_order(graph.counts, mean_place(labels, chains, len(graph.n))))
     order = order[(graph.n[order] > 0) | (order < FIRST)]
-    edge, new = _edge_gains(graph.counts[order[:, None], order])
     shared, own = _emission_gains(graph, points, chains.prior)
     shared[:, [START, END]] = -np.inf
-    into = np.where(np.tri(len(order), k=-1, dtype=bool), edge.T, -np.inf)
-    places, gain = _best_alignment(shared[:, order], own, into, new)
+    edges = edge_gains(graph.counts.T[order[:, None], order])
+    places, gain = best_alignment(shared[:, order], own, *edges)
     return np.where(places < 0, -1, order[places]), gain
 
 
-def _best_alignment(shared, own, into, new):
-    """The recursion of `align_chain` over nodes in topological order; edges `into` v from u (S, S).
+def best_alignment(shared, own, after, before, along, anew):
+    """The recursion of `align_chain` (Sec. V).
 
-    START comes first and END last.
+    Nodes are in topological order, START first, END last. An edge that there is gains more than a
+    new one, so that of the nodes before v only the best needs to be known, and the edges into v.
+
+    Parameters
+    ----------
+    shared, own : (L, S) and (L,) float arrays
+        What subgoals gain in each node, and in a state of their own, in nats.
+    after, before, along, anew : arrays
+        The `edge_gains` of the nodes.
+
+    Returns
+    -------
+    places : (L,) int array
+        -1 for a state of its own.
+    gain : float
+        In nats.
     """
-    nodes, steps = np.arange(len(new)), []
-    matched, apart = np.where(nodes == 0, 0.0, -np.inf), np.full(len(new), -np.inf)
-    for i in range(len(own) + 1):
-        by_edge, anew = into + matched, _best_before(apart)
-        came = by_edge.argmax(1)
-        direct, left = by_edge[nodes, came], matched + new
-        steps.append((came, anew, direct >= apart[anew], left >= apart))
-        arrived = np.maximum(direct, apart[anew])
-        if i < len(own):
-            matched, apart = shared[i] + arrived, own[i] + np.maximum(left, apart)
-    return _trace_back(steps), float(arrived[-1])
+    groups = np.flatnonzero(np.diff(after, prepend=-1))
+    heads, into = after[groups], np.full(len(anew), -np.inf)
+    matched, apart = np.full((2, len(own) + 1, len(anew)), -np.inf)
+    matched[0, 0] = 0.0
+    for i in range(len(own)):
+        left = matched[i] + anew
+        into[heads] = np.maximum.reduceat(matched[i][before] + along, groups)
+        np.maximum(left, apart[i], out=left)
+        arrived = np.maximum.accumulate(left)[:-1]
+        np.maximum(arrived, into[1:], out=arrived)
+        np.add(shared[i, 1:], arrived, out=matched[i + 1, 1:])
+        np.add(own[i], left, out=apart[i + 1])
+    return _traced_back(matched, apart, after, before, along, anew)
 
 
-def _best_before(values):
-    """For each place, where among those before it the highest value is; the first gets itself."""
-    highest = np.where(values == np.maximum.accumulate(values), np.arange(len(values)), 0)
-    return np.append(0, np.maximum.accumulate(highest)[:-1])
-
-
-def _trace_back(steps):
-    """Follow the choices back from END: the node of each subgoal, -1 for a state of its own."""
-    node, alone, chain = -1, False, []
-    for came, anew, is_direct, just_left in reversed(steps):
+def _traced_back(matched, apart, after, before, along, anew):
+    """Which node each subgoal went to, back from END, and the whole gain."""
+    node, alone, chain, gain = len(anew) - 1, False, [], None
+    for i in range(len(matched) - 1, -1, -1):
         if alone:
-            alone = not just_left[node]
+            alone = matched[i, node] + anew[node] < apart[i, node]
         else:
-            node, alone = (came[node], False) if is_direct[node] else (anew[node], True)
+            node, alone, best = _came_from(node, matched[i], apart[i], after, before, along, anew)
+            gain = best if gain is None else gain
         chain.append(-1 if alone else node)
-    return np.array(chain[-2::-1], int)
+    return np.array(chain[-2::-1], int), float(gain)
+
+
+def _came_from(node, matched, apart, after, before, along, anew):
+    """The last node shared before a node, whether a subgoal lies in between, and the gain there.
+
+    Of equals an edge or a new one goes before a subgoal apart; then the first node, or the last.
+    """
+    direct = matched[:node] + anew[:node]
+    edges = slice(*np.searchsorted(after, [node, node + 1]))
+    direct[before[edges]] = matched[before[edges]] + along[edges]
+    came, last = int(direct.argmax()), node - 1 - int(apart[node - 1 :: -1].argmax())
+    if direct[came] >= apart[last]:
+        return came, False, direct[came]
+    return last, True, apart[last]
 
 
 def _taken_out(k, labels, chains, graph):
@@ -146,16 +188,42 @@ def _aligned(k, labels, chains, graph):
     return renewed, gain
 
 
-def _mean_place(labels, chains, size):
-    """Where in their demonstrations the subgoals of each node come on average: (S,), in (0, 1)."""
+def mean_place(labels, chains, size):
+    """Where in their demonstrations the subgoals of each node come on average (Sec. V).
+
+    Parameters
+    ----------
+    labels, chains : (M,) int array and record
+    size : int
+        The number S of nodes.
+
+    Returns
+    -------
+    (S,) float array
+        Between 0, the start, and 1, the end.
+    """
     number = np.bincount(labels, minlength=size)
     place = np.bincount(labels, chains.place, size) / np.maximum(number, 1)
     place[[START, END]] = 0, 1
     return place
 
 
-def _compact(labels):
-    """The same partition, its labels numbered without gaps from FIRST."""
+def compact(labels):
+    """The same partition, its labels numbered without gaps from FIRST (Sec. V).
+
+    Parameters
+    ----------
+    labels : (M,) int array
+
+    Returns
+    -------
+    (M,) int array
+
+    Examples
+    --------
+    >>> compact(np.array([7, 9, 7, 3])).tolist()
+    [3, 4, 3, 2]
+    """
     return np.unique(labels, return_inverse=True)[1].reshape(-1) + FIRST
 
 
@@ -175,7 +243,7 @@ def _realign(labels, chains):
         renewed, after = _aligned(k, labels, chains, rest)
         idle += 1
         if after - before > LEAST_GAIN:
-            labels, idle = _compact(renewed), 0
+            labels, idle = compact(renewed), 0
             graph = graph_of(labels, chains)
         if idle == len(order):
             return labels
@@ -186,14 +254,14 @@ def _rebuild(labels, chains):
     rebuilt = np.full(len(labels), START)
     for k in _worst_explained_first(labels, chains)[::-1]:
         rebuilt, _ = _aligned(k, rebuilt, chains, graph_of(rebuilt, chains))
-    return _compact(rebuilt)
+    return compact(rebuilt)
 
 
 def _improve(labels, chains):
     """Labels that neither aligning one demonstration afresh nor merging two states can improve."""
     improved = None
     while not np.array_equal(labels, improved):
-        improved = _realign(_compact(labels), chains)
+        improved = _realign(compact(labels), chains)
         labels = merge_states(improved, chains)
     return improved
 
@@ -213,7 +281,7 @@ def estimate_structure(chains):
     (M,) int array
         Labels, numbered without gaps.
     """
-    labels = _compact(merge_states(np.arange(len(chains.points)) + FIRST, chains))
+    labels = compact(merge_states(np.arange(len(chains.points)) + FIRST, chains))
     while True:
         rebuilt = _improve(_rebuild(labels, chains), chains)
         gain = evidence_of(rebuilt, chains) - evidence_of(labels, chains)
@@ -245,7 +313,7 @@ def set_apart(labels, chains):
         if np.array_equal(strangers, apart):
             return labels
         apart = strangers
-        labels = _compact(labels + apart[chains.owner] * labels.max())
+        labels = compact(labels + apart[chains.owner] * labels.max())
 
 
 def coverage_of(states, path):
@@ -281,7 +349,7 @@ def numbered(labels, chains):
         Labels.
     """
     counts = graph_of(labels, chains).counts
-    order = topological_order(counts, _mean_place(labels, chains, len(counts)))
+    order = topological_order(counts, mean_place(labels, chains, len(counts)))
     return np.argsort(order)[labels] - 1 + FIRST  # the order begins with START and ends with END
 
 

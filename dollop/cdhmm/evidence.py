@@ -18,7 +18,7 @@ Their evidence is, for the Normal-inverse-Wishart and for the Dirichlet of beta 
 The paper names its merge test only by reference: these formulas are a reconstruction.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -102,20 +102,79 @@ def chains_of(sequences, spread):
         With `points`, `centre`, `slices`, `owner`, `place` and `prior`.
     """
     lengths = [len(sequence) for sequence in sequences]
-    ends = np.cumsum(lengths)
-    slices = tuple(map(slice, (ends - lengths).tolist(), ends.tolist()))
-    owner = np.repeat(np.arange(len(lengths)), lengths)
+    owner, slices = np.repeat(np.arange(len(lengths)), lengths), _slices_of(lengths)
     place = np.concatenate([np.arange(1, length + 1) / (length + 1) for length in lengths])
     points = np.concatenate(sequences)
     centre = points.mean(0)
     points = points - centre
-    return _Chains(points, centre, slices, owner, place, _prior_over(points, spread))
+    return _Chains(points, centre, slices, owner, place, prior_over(points, spread))
 
 
-def _prior_over(points, spread):
-    """Expect states of covariance spread^2, their means as wide apart as the subgoals are.
+def subgoals_of(chains, chosen):
+    """Where the subgoals of some demonstrations stand among all (Sec. V).
 
-    No less than the spread, though.
+    Parameters
+    ----------
+    chains : record
+        That of `chains_of`.
+    chosen : (C,) int array
+        Numbers of demonstrations, in any order.
+
+    Returns
+    -------
+    (m,) int array
+    """
+    every = np.arange(len(chains.points))
+    return np.concatenate([every[chains.slices[k]] for k in chosen])
+
+
+def chains_within(chains, chosen):
+    """Some of the demonstrations as a record of their own, of the same centre and prior (Sec. V).
+
+    Parameters
+    ----------
+    chains : record
+        That of `chains_of`.
+    chosen : (C,) int array
+        Their numbers, in the order wanted.
+
+    Returns
+    -------
+    record
+        As `chains_of` makes.
+    """
+    subgoals, lengths = subgoals_of(chains, chosen), np.bincount(chains.owner)[chosen]
+    return replace(
+        chains,
+        points=chains.points[subgoals],
+        slices=_slices_of(lengths),
+        owner=np.repeat(np.arange(len(chosen)), lengths),
+        place=chains.place[subgoals],
+    )
+
+
+def _slices_of(lengths):
+    """Where things of these lengths (D,) lie, one after the other."""
+    ends = np.cumsum(lengths)
+    return tuple(map(slice, (ends - lengths).tolist(), ends.tolist()))
+
+
+def prior_over(points, spread):
+    """Expect states of covariance spread^2, their means as wide apart as the subgoals are (Sec. V).
+
+    No less than the spread, though (reconstruction).
+
+    Parameters
+    ----------
+    points : (M, 2) float array
+        In m, from their mean.
+    spread : float
+        Standard deviation in m.
+
+    Returns
+    -------
+    record
+        With `kappa`, `nu`, `psi` and `most`.
     """
     nu, width = 8.0, max(np.sqrt(np.mean(points**2)), spread)
     return _Prior((spread / width) ** 2, nu, (nu - 3) * spread**2, 2 * len(points))
@@ -209,7 +268,8 @@ def graph_of(labels, chains):
 
 def _sums(labels, values, size):
     """Sums (size, d) of the values (M, d) of each label (M,)."""
-    return np.stack([np.bincount(labels, column, size) for column in values.T], axis=-1)
+    columns = [np.bincount(labels, column, size) for column in values.T]
+    return np.stack(columns, axis=-1).astype(float)  # whole numbers where there are none
 
 
 def evidence_of(labels, chains):

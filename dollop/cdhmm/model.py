@@ -16,7 +16,17 @@ import numpy as np
 import scipy
 
 from dollop.cdhmm import alignment
-from dollop.cdhmm.evidence import END, FIRST, START, chains_of, evidence_of, graph_of, outer_products
+from dollop.cdhmm.evidence import (
+    END,
+    FIRST,
+    START,
+    chains_of,
+    evidence_of,
+    graph_of,
+    outer_products,
+)
+from dollop.cdhmm.growing import structure_of
+from dollop.cdhmm.spread import estimate_spread
 from dollop.checks import checked_positions
 
 __all__ = ["SubgoalHMM"]
@@ -48,10 +58,12 @@ class SubgoalHMM:
         The state of each of these subgoals. A demonstration visits no state twice.
     spread : float
         How far one subgoal is expected to lie from its mean along each axis, standard deviation in
-        m.
+        m: as named to `fit`, or its estimate.
     evidence : float
         Logarithm of the probability of all subgoals and of their order, in nats, with the
         parameters integrated out.
+    estimated : bool
+        Whether nobody named the spread.
 
     Examples
     --------
@@ -72,6 +84,7 @@ class SubgoalHMM:
     states: tuple
     spread: float
     evidence: float
+    estimated: bool = False
 
     def __repr__(self):
         path = " ".join(map(str, self.most_likely_path()))
@@ -79,7 +92,7 @@ class SubgoalHMM:
         return f"SubgoalHMM of {shown}, most-likely path {path}"
 
     @classmethod
-    def fit(cls, sequences, spread=0.15):
+    def fit(cls, sequences, spread=None):
         """Estimate structure and parameters from the subgoals of each demonstration (Sec. V).
 
         Parameters
@@ -87,10 +100,11 @@ class SubgoalHMM:
         sequences : sequence of (K, 2) array_like
             The subgoals of each demonstration in order, in m, all in one environment. Lengths may
             differ.
-        spread : float
+        spread : float, optional
             How far one subgoal is expected to lie from its mean along each axis, standard deviation
             in m. Two single subgoals are merged up to about four times this apart, less or more by
-            what their neighbours say.
+            what their neighbours say. By default the one that makes the demonstrations most
+            evident, and 0.15 m where they say nothing (`dollop.cdhmm.spread`).
 
         Returns
         -------
@@ -101,19 +115,30 @@ class SubgoalHMM:
         ValueError
             No demonstration, one that is empty, not (K, 2) or not finite, or a spread that is not
             positive.
+
+        Examples
+        --------
+        A user who is sloppier than others is understood as well:
+
+        >>> task, random = [(0, 0), (2, 0), (2, 2), (0, 2)], np.random.default_rng(1)
+        >>> model = SubgoalHMM.fit([task + random.normal(0, 0.3, (4, 2)) for _ in range(4)])
+        >>> len(model.most_likely_path()), round(model.spread, 1)
+        (4, 0.3)
         """
         sequences = tuple(checked_sequence(s, f"demonstration {k}") for k, s in enumerate(sequences))
         if not sequences:
             raise ValueError("sequences must hold at least one demonstration, got none")
+        estimated = spread is None
+        spread = estimate_spread(sequences) if estimated else spread
         if not LEAST_SPREAD <= spread <= MOST_SPREAD:
             raise ValueError(f"spread must lie between {LEAST_SPREAD:g} and {MOST_SPREAD:g} m, got {spread}")
         chains = chains_of(sequences, spread)
-        labels = alignment.set_apart(alignment.estimate_structure(chains), chains)
+        labels = alignment.set_apart(structure_of(chains), chains)
         labels = alignment.numbered(labels, chains)
-        return cls._of(labels, chains, sequences, spread)
+        return cls._of(labels, chains, sequences, spread, estimated)
 
     @classmethod
-    def _of(cls, labels, chains, sequences, spread):
+    def _of(cls, labels, chains, sequences, spread, estimated):
         graph = graph_of(labels, chains)
         probability = graph.counts / np.maximum(graph.counts.sum(1), 1)[:, None]
         means, covariances = parameters_of(graph, chains.prior)
@@ -127,10 +152,13 @@ class SubgoalHMM:
             states=tuple(labels[part] - FIRST for part in chains.slices),
             spread=float(spread),
             evidence=evidence_of(labels, chains),
+            estimated=estimated,
         )
 
     def add(self, sequence):
         """The model of all demonstrations so far and one more: as fitting all at once (Sec. V).
+
+        A spread that nobody named is estimated anew.
 
         Parameters
         ----------
@@ -146,7 +174,7 @@ class SubgoalHMM:
         ValueError
             A sequence that is empty, not (K, 2) or not finite.
         """
-        return SubgoalHMM.fit([*self.sequences, sequence], self.spread)
+        return SubgoalHMM.fit([*self.sequences, sequence], None if self.estimated else self.spread)
 
     def most_likely_path(self):
         """States of the most probable way from start to end: the task (Sec. V).

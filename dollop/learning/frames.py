@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Frames", "frames_of"]
+__all__ = ["Frames", "frames_like", "frames_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def _turned(vectors, angles):
     return np.stack([z.real, z.imag], axis=-1)
 
 
-def frames_of(environments, partners, n_objects, corners):
+def frames_of(environments, partners, corners):
     """The frames of N objects in D environments (beyond the paper).
 
     Parameters
@@ -100,8 +100,6 @@ def frames_of(environments, partners, n_objects, corners):
     environments : sequence of D Environment
     partners : sequence of D int arrays
         For each object of environment d, which of the N it is; -1 where it is none of them.
-    n_objects : int
-        N.
     corners : (N, 4, 2) float array
         Of each object from its middle, in m.
 
@@ -110,27 +108,57 @@ def frames_of(environments, partners, n_objects, corners):
     Frames
         Of N objects, of those among them whose direction is known wherever they stand, and of the world.
     """
-    shape = len(environments), n_objects
-    centres, turns, present = np.zeros((*shape, 2)), np.full(shape, np.nan), np.zeros(shape, bool)
-    for d, (environment, goes) in enumerate(zip(environments, partners, strict=True)):
-        known = np.flatnonzero(goes >= 0)
-        centres[d, goes[known]] = environment.centres[known]
-        turns[d, goes[known]] = environment.directions[known]
-        present[d, goes[known]] = True
+    n = len(corners)
+    stood = [_stood(environment, goes, n) for environment, goes in zip(environments, partners, strict=True)]
+    centres, turns, present = map(np.array, zip(*stood, strict=True))
     turning = np.flatnonzero((np.isfinite(turns) | ~present).all(axis=0) & present.any(axis=0))
-    objects = np.concatenate([np.arange(n_objects), turning, [-1]])
-    still = np.zeros(shape)
-    world = np.zeros((len(environments), 1))
-    return Frames(
-        np.concatenate([centres, centres[:, turning], np.zeros((len(environments), 1, 2))], axis=1),
-        np.concatenate([still, np.nan_to_num(turns[:, turning]), world], axis=1),
-        np.concatenate([present, present[:, turning], world == 0], axis=1),
-        objects,
-        _turning(n_objects, len(turning)),
-        np.concatenate([corners, corners[turning], np.full((1, 4, 2), np.nan)]),
+    objects, kinds = (
+        np.concatenate([np.arange(n), turning, [-1]]),
+        np.repeat([False, True, False], [n, len(turning), 1]),
     )
+    outlines = np.concatenate([corners, corners[turning], np.full((1, 4, 2), np.nan)])
+    return _frames(centres, turns, present, objects, kinds, outlines)
 
 
-def _turning(still, turning):
-    """(F,) bool: so many frames that do not turn, so many that do, and the world."""
-    return np.repeat([False, True, False], [still, turning, 1])
+def frames_like(objects, turning, environment, partners):
+    """Frames that are known already, in another environment (beyond the paper).
+
+    Parameters
+    ----------
+    objects, turning : (F,) int and bool arrays
+        As of `Frames`.
+    environment : Environment
+    partners : (M,) int array
+        For each object of the environment, which of the frames' objects it is; -1 for none.
+
+    Returns
+    -------
+    Frames
+        In one environment; a frame that turns is absent where the direction is not known.
+    """
+    n = objects.max(initial=-1) + 1
+    centres, turns, present = (each[None] for each in _stood(environment, partners, n))
+    found = _frames(centres, turns, present, objects, turning, np.full((len(objects), 4, 2), np.nan))
+    known = np.isfinite(turns[:, objects[turning]]) if turning.any() else np.ones((1, 0), bool)
+    found.present[:, turning] &= known
+    return found
+
+
+def _stood(environment, partners, n):
+    """Centres (n, 2), directions (n,) and presence (n,) of n objects in an environment."""
+    centres, turns, present = np.zeros((n, 2)), np.full(n, np.nan), np.zeros(n, bool)
+    known = np.flatnonzero(partners >= 0)
+    centres[partners[known]] = environment.centres[known]
+    turns[partners[known]] = environment.directions[known]
+    present[partners[known]] = True
+    return centres, turns, present
+
+
+def _frames(centres, turns, present, objects, turning, corners):
+    """Frames of objects that stood at centres (D, N, 2); the last one is the world."""
+    count, inside = len(centres), objects[:-1]
+    origins = np.concatenate([centres[:, inside], np.zeros((count, 1, 2))], axis=1)
+    angles = np.where(turning[:-1], np.nan_to_num(turns[:, inside]), 0.0)
+    there = np.concatenate([present[:, inside], np.ones((count, 1), bool)], axis=1)
+    angles = np.concatenate([angles, np.zeros((count, 1))], axis=1)
+    return Frames(origins, angles, there, objects, turning, corners)

@@ -9,13 +9,12 @@ What a walk lacks at its beginning or end, or has more than the way, is left out
 """
 
 import numpy as np
-import scipy
 
 __all__ = ["alikeness", "warped"]
 
 SPREAD, CUT = 0.15, 8.0
 """m and nats: how far walks miss the same place; and from where on farther is no less alike."""
-SKIPPED = 3.0
+SKIPPED = 5.0
 """Nats: what it costs that a place at either end has no sample, or a sample no place."""
 FEWEST = 1e-2
 """Share: a frame that a place follows less than that says nothing of it."""
@@ -94,7 +93,8 @@ def _warped(cost, skipped):
         place, sample = int(end_place.argmin()), samples
     else:
         place, sample = places, int(end_sample.argmin())
-    return (*_traced(total, cost, place, sample), min(end_place.min(), end_sample.min()))
+    at, covered, beyond = _traced(total, cost, place, sample)
+    return at, covered, min(end_place.min(), end_sample.min()), beyond
 
 
 def _traced(total, cost, place, sample):

@@ -26,7 +26,7 @@ from dollop.trajectory import arc_length, at_arc_length
 
 __all__ = [
     "KEPT", "LAYOUTS", "SEED", "adapted_task", "background_map", "eight_runs", "empty_lab",
-    "figure_eights",
+    "figure_eights", "hand_over_turns",
     "kidnapped_runs", "largest_corner", "matched_right", "matchings_from_laser",
     "moved_environment", "moved_runs", "moved_scene", "nearest", "new_slalom_task",
     "passing_sides", "same_sides", "save_all", "slalom", "slalom_runs", "slalom_task",
@@ -496,10 +496,6 @@ def slalom_runs(control="pursuit", avoid=True, count=10):
 def largest_corner(law, over=0.1):
     """The largest angle by which a law's response turns where a segment hands over to the next.
 
-    It is the angle between the ways to the place of the handing over and on from it, each so many
-    metres of the response: in its last centimetres a response curls into its subgoal, which no
-    robot can follow and no eye sees.
-
     Parameters
     ----------
     law : SequencedLDS
@@ -511,11 +507,33 @@ def largest_corner(law, over=0.1):
     float
         In rad; 0 for a single segment.
     """
+    return float(hand_over_turns(law, over).max(initial=0))
+
+
+def hand_over_turns(law, over=0.1):
+    """The angles by which a law's response turns where a segment hands over to the next.
+
+    Each is the angle between the ways to the place of the handing over and on from it, each so many
+    metres of the response: in its last centimetres the response of an LDS alone curls into its
+    subgoal, which no robot can follow and no eye sees.
+
+    Parameters
+    ----------
+    law : SequencedLDS
+        Of K segments.
+    over : float
+        In m.
+
+    Returns
+    -------
+    (K - 1,) float array
+        In rad.
+    """
     response = law.response()
     place = arc_length(response)[_hand_overs(law, response)]
     before, here, after = (at_arc_length(response, place + shift) for shift in (-over, 0, over))
     arriving, going_on = (here - before) @ (1, 1j), (after - here) @ (1, 1j)
-    return float(np.abs(np.angle(going_on * arriving.conj())).max(initial=0))
+    return np.abs(np.angle(going_on * arriving.conj()))
 
 
 def _hand_overs(law, response, reach=0.01):

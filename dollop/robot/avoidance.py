@@ -23,7 +23,7 @@ import scipy
 
 from dollop.gridmap import covered_cells, in_cells, in_metres
 
-__all__ = ["FREE_BELOW", "Geodesic", "ObstacleMap", "towards"]
+__all__ = ["FREE_BELOW", "INFLUENCE", "KEPT", "Geodesic", "ObstacleMap", "towards"]
 
 ROBOT_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""

@@ -11,8 +11,11 @@ user would have done from there. Two control laws make v and omega of it:
 - `Plain` turns towards u and drives at the demonstrated speed; it knows nothing of what the robot
   can do. A segment hands over within 0.25 m of its subgoal.
 - `Pursuit` rolls the response out from the current state and pursues a point ahead on it, slower
-  where it bends. A segment hands over where the place on the response that is nearest to the robot
-  belongs to the next.
+  where it bends. It is the response that comes back to the shown way after a push, and does not turn
+  sharply at a subgoal (`dollop.law.line`). A segment hands over where the place on the response that
+  is nearest to the robot belongs to the next.
+
+Both drive at the speed that was shown there, and wait at a subgoal as long as the demonstrator did.
 
 The paper gives neither the rule of handing over nor a controller: both are reconstructions.
 """
@@ -22,10 +25,11 @@ from math import atan2, cos, dist, inf, sin
 
 import numpy as np
 
+from dollop.law.line import Fading
 from dollop.pose import wrapped
 from dollop.robot.avoidance import Geodesic, towards
 
-__all__ = ["CONTROL_LAWS", "PIONEER_LIMITS", "REACH", "Guidance", "Limits", "clip"]
+__all__ = ["CONTROL_LAWS", "PATIENCE", "PIONEER_LIMITS", "REACH", "STEP", "Guidance", "Limits", "clip"]
 
 REACH = 0.25
 """Distance in m from its subgoal at which a segment hands over: a robot that needs 0.6 m to turn
@@ -127,6 +131,9 @@ class Guidance:
         self.obstacles = obstacles
         self.goals = [tuple(segment.goal.tolist()) for segment in law.segments]
         self._steps = [(segment.A - np.eye(2)).ravel().tolist() for segment in law.segments]
+        self._lines = law.lines(STEP / 2)
+        self.pauses = [0.0] * (len(self.goals) + 1) if law.pauses is None else law.pauses.tolist()
+        self._relative = None if law.profile is None else law.profile / np.asarray(law.speeds)[:, None]
         self._weights = [lyapunov_weights(segment.A) for segment in law.segments]
         self.detours, self._geodesics = {}, {}
 
@@ -213,34 +220,44 @@ class Guidance:
         at_end = detour is not None and dist(detour.goal, here) < reach
         return at_end or dist(self.goals[k], here) < reach
 
-    def _leg(self, k, x, y):
-        """Places 5 cm apart on the response of segment k from x, y in m, and whether it arrived."""
-        places, ahead = [], (x, y)
+    def shown_pace(self, k, places):
+        """The speed that was shown at places of a segment, as a share of its mean.
+
+        Parameters
+        ----------
+        k : int
+            The segment.
+        places : (N, 2) array_like
+            In m.
+
+        Returns
+        -------
+        (N,) float array
+        """
+        places = np.asarray(places, float)
+        if self._relative is None:
+            return np.ones(len(places))
+        line, along = self._lines[k], self._relative[k]
+        squared = ((places[:, None] - line.places) ** 2).sum(axis=2)
+        share = line.way[squared.argmin(axis=1)] / max(line.way[-1], STEP)
+        return along[np.minimum((share * len(along)).astype(int), len(along) - 1)]
+
+    def _leg(self, k, x, y, at=None):
+        """Places 5 cm apart on the response of segment k from x, y in m, and whether it arrived.
+
+        It is beside place `at` of the segment's line; by default beside the nearest.
+        """
+        places, line = [], Held(self._lines[k], x, y, at)
         for _ in range(round(FARTHEST / STEP)):
             if self.reached(k, x, y, STEP):
                 return places, True
-            ahead = self._state_ahead(k, ahead, x, y)
-            wish = towards(*ahead, x, y)
+            wish = towards(*line.ahead(x, y), x, y)
             ux, uy = self._led(k, x, y, *wish)
             x, y = x + STEP * ux, y + STEP * uy
             if (ux, uy) != wish:  # led elsewhere, the response goes on from there
-                ahead = x, y
+                line.push(x, y)
             places.append((x, y))
         return places, False
-
-    def _state_ahead(self, k, state, x, y):
-        """The first of the states of segment k from `state` on that is 5 cm from x, y in m.
-
-        It is the subgoal where the response comes that near to it before.
-        """
-        here, goal, (a, b, c, d) = (x, y), self.goals[k], self._steps[k]
-        while dist(state, here) < STEP:
-            if dist(state, goal) < STEP:
-                return goal
-            offset_x, offset_y = state[0] - goal[0], state[1] - goal[1]
-            state_x = state[0] + a * offset_x + b * offset_y
-            state = state_x, state[1] + c * offset_x + d * offset_y
-        return state
 
     def way(self, k, x, y):
         """The responses of a segment and of all after it, rolled out one after the other.
@@ -266,15 +283,49 @@ class Guidance:
         for segment in range(k, len(self.goals)):
             if segment > k:
                 self.detours.pop(segment, None)
-            leg, arrived = self._leg(segment, *places[-1])
+            at = 0 if segment > k else None
+            leg, arrived = self._leg(segment, *places[-1], at)
             if not arrived:
                 self.detour(segment)
-                leg, arrived = self._leg(segment, *places[-1])
+                leg, arrived = self._leg(segment, *places[-1], at)
             if not arrived:
                 break
             places += leg
             segments += [segment] * len(leg)
         return places, segments
+
+
+class Held:
+    """The response of a segment from x, y in m, which comes back to the segment's line.
+
+    It is beside place `at` of the line, or of all the nearest.
+    """
+
+    def __init__(self, line, x, y, at=None):
+        self.line, self.places = line, line.places.tolist()
+        self.at, self.last = line.nearest((x, y)) if at is None else at, len(self.places) - 1
+        self.push(x, y)
+
+    def push(self, x, y):
+        """Go on from x, y in m, which is beside the nearest of the places that come next."""
+        here = min(self.at, self.last)
+        while here < self.last and dist(self.places[here + 1], (x, y)) <= dist(self.places[here], (x, y)):
+            here += 1
+        line_x, line_y = self.places[here]
+        self.at, self.state = here, (x, y)
+        self.fading = Fading(self.line, here, x - line_x, y - line_y)
+
+    def ahead(self, x, y):
+        """The first of the coming states that is 5 cm from x, y in m, or the subgoal if it comes before."""
+        goal = self.places[-1]
+        while dist(self.state, (x, y)) < STEP:
+            if self.at >= self.last and dist(self.state, goal) < STEP:
+                return goal
+            self.at += 1
+            line_x, line_y = self.places[min(self.at, self.last)]
+            offset_x, offset_y = self.fading.offset(self.at)
+            self.state = line_x + offset_x, line_y + offset_y
+        return self.state
 
 
 def lyapunov_weights(A):
@@ -301,6 +352,8 @@ class Supervisor:
         Whether the last one has handed over.
     hopeless : bool
         Whether there is no progress, however slow the robot.
+    waiting : float
+        Time in s that the robot is still to stand at a subgoal, as the demonstrator did.
     pace : float
         Share of the demonstrated speed. It is halved when there is no progress: the slower a robot,
         the more exactly it can follow the direction of the law, whose Lyapunov measure falls
@@ -309,8 +362,8 @@ class Supervisor:
 
     def __init__(self, guidance, speeds, robot):
         self.guidance, self.limits, self.period = guidance, robot.limits, robot.period
-        self.speeds = [min(max(float(speed), LEAST_SPEED), robot.limits.speed) for speed in speeds]
-        self.active, self.done, self.hopeless = 0, False, False
+        self.speeds = [float(speed) for speed in speeds]
+        self.active, self.done, self.hopeless, self.waiting = 0, False, False, 0.0
         self.last = robot.pose[:2]
         self.restart()
 
@@ -343,11 +396,24 @@ class Supervisor:
             self.hopeless = self.pace < SLOWEST
 
     def hand_over(self, segment):
-        """Put `segment` in force."""
+        """Put `segment` in force, once the robot has stood as long as was shown."""
         self.done = segment == len(self.speeds)
         if not self.done:
+            self.waiting += sum(self.guidance.pauses[self.active + 1 : segment + 1])
             self.active = segment
             self.restart()
+
+    def waits(self):
+        """Whether the robot is to stand still in this period, because the demonstrator did."""
+        if self.waiting < self.period / 2:
+            return False
+        self.waiting -= self.period
+        return True
+
+    def shown_speeds(self, k, places):
+        """Speeds (N,) in m/s shown at places (N, 2) of segment k, within what the robot can."""
+        speeds = self.speeds[k] * self.guidance.shown_pace(k, places)
+        return np.clip(speeds, LEAST_SPEED, self.limits.speed)
 
     def safe(self, speed, x, y, theta):
         """The speed in m/s, or less where it could not be braked in time."""
@@ -368,13 +434,16 @@ class Plain(Supervisor):
         self.notice_kidnapping(x, y)
         if self.guidance.reached(self.active, x, y, REACH):
             self.hand_over(self.active + 1)
+        if self.waits():
+            return 0.0, 0.0
         remaining = self.guidance.remaining(self.active, x, y)
         self.expect_progress(remaining, 0.02 * min(remaining, 1.0))
         ux, uy = self.guidance.direction(self.active, x, y)
         if ux == uy == 0.0:
             return 0.0, 0.0
         error = wrapped(atan2(uy, ux) - theta)
-        speed = 0.0 if abs(error) > SHARP else self.speeds[self.active] * self.pace * cos(error)
+        shown = float(self.shown_speeds(self.active, [(x, y)])[0])
+        speed = 0.0 if abs(error) > SHARP else shown * self.pace * cos(error)
         return self.safe(speed, x, y, theta), clip(TURN_GAIN * error, self.limits.turn)
 
 
@@ -392,11 +461,18 @@ class Pursuit(Supervisor):
         """Roll the response out from x, y in m, and straight on beyond its end, to be pursued."""
         self.places, self.segments = self.guidance.way(self.active, x, y)
         self.at, self.end = 0, len(self.places) - 1
-        ux, uy = self.guidance.direction(len(self.speeds) - 1, *self.places[max(self.end - 1, 0)])
+        last = len(self.speeds) - 1
         end_x, end_y = self.places[-1]
+        ux, uy = towards(end_x, end_y, *self.places[max(self.end - 2, 0)])
+        if ux == uy == 0.0:
+            ux, uy = self.guidance.direction(last, end_x, end_y)
         on = range(1, LOOK_AHEAD + 1)
         self.places += [(end_x + i * STEP * ux, end_y + i * STEP * uy) for i in on]
-        demonstrated = np.array(self.speeds)[self.segments + [len(self.speeds) - 1] * LOOK_AHEAD]
+        segments = np.array(self.segments + [last] * LOOK_AHEAD)
+        demonstrated = np.empty(len(segments))
+        for k in set(self.segments) | {last}:
+            mine = segments == k
+            demonstrated[mine] = self.shown_speeds(k, np.array(self.places)[mine])
         self.planned = bend_speeds(np.array(self.places), demonstrated, self.limits).tolist()
 
     def command(self, x, y, theta):
@@ -405,6 +481,8 @@ class Pursuit(Supervisor):
         if dist(self.places[self.at], (x, y)) > STRAY:
             self.plan(x, y)
         self.advance(x, y)
+        if self.waits():
+            return 0.0, 0.0
         ahead = self.pursued(x, y)
         error = wrapped(atan2(ahead[1] - y, ahead[0] - x) - theta)
         curvature = 2 * sin(error) / max(dist(ahead, (x, y)), STEP)

@@ -2,19 +2,24 @@
 
 A robot is anything with `pose` (x, y in m, theta in rad: what it believes), `localised` (whether it
 trusts its belief), `limits`, `period` in s, and `drive(v, omega)`, which lets one period pass. One
-that can feel what it touches has `touching`; a simulated one has `true_pose`, for measuring, and
-`place(pose)`, which kidnaps it. Here is a fast one for studies; `dollop.lab` has the Pioneer.
+that can feel what it touches has `touching`; one that sees what its map does not have tells it by
+`noticed`, an Environment of all that it has noticed so far; a simulated one has `true_pose`, for
+measuring, and `place(pose)`, which kidnaps it. Here is a fast one for studies; `dollop.lab` has the
+Pioneer.
 """
 
 from dataclasses import dataclass
+from itertools import chain
 from math import isfinite
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive
+from dollop.checks import check_choice, check_positive, put_in
+from dollop.environment import Environment
 from dollop.pose import moved_pose
 from dollop.robot.avoidance import ObstacleMap
-from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, Guidance, Limits, clip
+from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, Limits, clip
+from dollop.robot.ways import WayKeeper
 
 __all__ = ["Run", "Unicycle", "perform"]
 
@@ -38,12 +43,12 @@ class Run:
     true_poses : (N, 3) float array
         As it was; the same for a robot that knows its pose.
     active : (N,) int array
-        Index of the segment in force.
+        Index of the segment in force, within the way in force.
     localised : (N,) bool array
         Whether the robot trusted its pose.
     clearance : (N,) float array
         Distance in m between the edge of the robot, taken as a disc, and the nearest obstacle on
-        its map.
+        its map, or that it has noticed by then.
     finished : bool
         Whether every segment handed over.
     reason : str
@@ -53,6 +58,9 @@ class Run:
         falling below zero.
     kidnapped : (M,) float array
         Times in s.
+    way : (N,) int array, optional
+        Index of the way in force among the ways of the task; 0, the one most often shown, if not
+        given.
     """
 
     t: np.ndarray
@@ -65,11 +73,25 @@ class Run:
     reason: str
     collisions: int
     kidnapped: np.ndarray
+    way: np.ndarray = None
+
+    def __post_init__(self):
+        if self.way is None:
+            put_in(self, way=np.zeros(len(self.t), dtype=int))
 
     def __repr__(self):
         end = "finished" if self.finished else self.reason
         touched = f"{self.collisions} collisions, least clearance {self.clearance.min():.2f} m"
-        return f"Run of {self.t[-1]:.1f} s: {end}; {touched}"
+        return f"Run of {self.t[-1]:.1f} s{told_ways(self)}: {end}; {touched}"
+
+
+def told_ways(run):
+    """Which ways a run was on and from when in s, where it was not the usual one all the time."""
+    if not run.way.any():
+        return ""
+    changes = np.flatnonzero(np.diff(run.way)) + 1
+    later = (f", from {run.t[i]:.1f} s on way {run.way[i]}" for i in changes)
+    return f" on way {run.way[0]}{''.join(later)}"
 
 
 class Unicycle:
@@ -136,14 +158,25 @@ def approach(value, goal, step):
 
 
 def perform(
-    task, robot, control="pursuit", avoid=True, background=None, kidnap=(), timeout=600.0, localise_within=120.0
+    task,
+    robot,
+    control="pursuit",
+    avoid=True,
+    background=None,
+    kidnap=(),
+    timeout=600.0,
+    localise_within=120.0,
 ):
     """Let a robot perform a task (Sec. III; Fig. 7, 10, 12).
 
     Parameters
     ----------
     task : Task
-        Anything with a `law` (SequencedLDS) and an `environment` (Environment).
+        Anything with a `law` (SequencedLDS) and an `environment` (Environment). If it has several
+        `ways` (tuple of SequencedLDS, the law first) and tells how often each was `shown` (tuple of
+        int), the robot takes the one that fits its start and is free, the one shown most often of
+        several, and changes to another that is free when it is blocked. The paper's kind, control
+        "plain" without avoiding, has one way only: the law.
     robot : Unicycle, dollop.lab.Pioneer, or one of your own
         See the top of `dollop.robot.performing`. Where it stands is where it starts. It drives
         until the task is finished or given up.
@@ -169,7 +202,8 @@ def perform(
     ------
     ValueError
         For an unknown control law, a start, subgoal or kidnapping that is not finite, off the map
-        or in an obstacle, a time-out that is not positive, or a kidnapping before the start.
+        or in an obstacle (a subgoal: if every way has such a one), a time-out that is not positive,
+        a kidnapping before the start, or no ways, or not as many as `shown` counts.
 
     Examples
     --------
@@ -186,16 +220,40 @@ def perform(
     if not (timeout > 0 and localise_within > 0):
         raise ValueError(f"timeout and localise_within must be positive, got {timeout} and {localise_within}")
     kidnap = sorted((float(time), tuple(pose)) for time, pose in kidnap)
-    places = named_places(task.law, robot, kidnap)
-    obstacles = ObstacleMap.of(task.environment, background, [place[:2] for _, place in places])
-    check_free(places, obstacles)
-    guidance = Guidance(task.law, obstacles if avoid else None)
-    supervisor = CONTROL_LAWS[control](guidance, task.law.speeds, robot)
-    records, reason = drive(supervisor, robot, list(kidnap), timeout, localise_within)
+    laws, shown = ways_of(task, only=control == "plain" and not avoid)
+    places, subgoals = named_places(robot, kidnap), list(map(named_subgoals, laws))
+    held = [place[:2] for _, place in [*chain.from_iterable(subgoals), *places]]
+
+    def chart(boxes):
+        boxes = np.vstack([task.environment.boxes, boxes])
+        return ObstacleMap.of(Environment(boxes), background, held)
+
+    keeper = WayKeeper(laws, shown, robot, control, chart, avoid)
+    check_some_way(subgoals, keeper.known)
+    check_free(places, keeper.known)
+    records, reason = drive(keeper, robot, list(kidnap), timeout, localise_within)
     robot.drive(0.0, 0.0)
     t = np.arange(len(records)) * robot.period
     kidnapped = [time for time, _ in kidnap if time < len(records) * robot.period]
-    return as_run(t, records, reason, obstacles, kidnapped)
+    return as_run(t, records, reason, kidnapped)
+
+
+def ways_of(task, only=False):
+    """The laws of a task, one for each way, and how often each was shown; or of the first only.
+
+    Raises
+    ------
+    ValueError
+        No ways, or not as many as are counted.
+    """
+    if only:
+        return (task.law,), (1,)
+    laws = tuple(getattr(task, "ways", (task.law,)))
+    shown = tuple(getattr(task, "shown", (1,) * len(laws)))
+    if not 0 < len(laws) == len(shown):
+        got = f"got {len(laws)} ways and {shown}"
+        raise ValueError(f"a task must have a way, and shown must count each, {got}")
+    return laws, shown
 
 
 class Search:
@@ -216,10 +274,10 @@ class Search:
         return self.speed, 0.0
 
 
-def drive(supervisor, robot, kidnap, timeout, localise_within):
+def drive(keeper, robot, kidnap, timeout, localise_within):
     """The control loop: what was the case in each period, and why it gave up, or nothing.
 
-    A record is (pose, true pose, segment, localised, touching).
+    A record is (pose, true pose, segment, way, localised, touching, map).
     """
     records, blind, search = [], 0.0, Search(robot.period)
     while True:
@@ -229,17 +287,21 @@ def drive(supervisor, robot, kidnap, timeout, localise_within):
         x, y, theta = pose = robot.pose
         touching = getattr(robot, "touching", None)
         true_pose = getattr(robot, "true_pose", pose)
-        records.append((pose, true_pose, supervisor.active, robot.localised, touching))
-        if not isfinite(x + y + theta):
+        finite = isfinite(x + y + theta)
+        if robot.localised and finite:
+            keeper.begin(x, y)
+        state = keeper.active, keeper.way, robot.localised, touching, keeper.known
+        records.append((pose, true_pose, *state))
+        if not finite:
             return records, f"the pose must be finite, got {x, y, theta} at {now:.1f} s"
         if robot.localised:
-            blind, command = 0.0, supervisor.command(x, y, theta)
+            blind, command = 0.0, keeper.command(x, y, theta)
         else:
             blind, command = blind + robot.period, search.command(touching)
-        if supervisor.done:
+        if keeper.done:
             return records, ""
-        if supervisor.hopeless:
-            return records, f"no progress towards subgoal {supervisor.active} at {now:.1f} s"
+        if keeper.hopeless:
+            return records, f"{keeper.reason} at {now:.1f} s"
         if blind > localise_within:
             return records, f"the robot has not known where it is for {localise_within:g} s"
         if now >= timeout:
@@ -247,35 +309,70 @@ def drive(supervisor, robot, kidnap, timeout, localise_within):
         robot.drive(*command)
 
 
-def as_run(t, records, reason, obstacles, kidnapped):
+def as_run(t, records, reason, kidnapped):
     """The records of the control loop at times (N,) in s as a Run."""
-    *poses, active, localised, touching = map(np.array, zip(*records, strict=True))
+    *columns, maps = zip(*records, strict=True)
+    *poses, active, way, localised, touching = map(np.array, columns)
     poses, true_poses = (each.astype(float) for each in poses)
-    clearance = obstacles.edges(true_poses[:, :2])
+    clearance = clearances(true_poses[:, :2], maps)
     contact = clearance < 0 if touching[0] is None else touching.astype(bool)
     collisions = int(np.count_nonzero(np.diff(contact, prepend=False) & contact))
     told = t, poses, true_poses, active, localised, clearance
-    return Run(*told, not reason, reason, collisions, np.array(kidnapped, dtype=float))
+    return Run(*told, not reason, reason, collisions, np.array(kidnapped, dtype=float), way)
 
 
-def named_places(law, robot, kidnap):
-    """The places that a run needs, each with its name: subgoals, start, kidnappings.
+def clearances(places, maps):
+    """Distances (N,) in m from the robot's edge at places (N, 2), each on the map of its period."""
+    clearance, of_map = np.empty(len(places)), {id(each): each for each in maps}
+    used = np.array(list(map(id, maps)))
+    for name, obstacles in of_map.items():
+        clearance[used == name] = obstacles.edges(places[used == name])
+    return clearance
+
+
+def named_subgoals(law):
+    """The subgoals of a law, each with its name.
+
+    Raises
+    ------
+    ValueError
+        One that is not finite.
+    """
+    return checked_finite([(f"subgoal {k}", place) for k, place in enumerate(law.subgoals)])
+
+
+def named_places(robot, kidnap):
+    """The other places that a run needs, each with its name: start, kidnappings.
 
     Raises
     ------
     ValueError
         One that is not finite, or a kidnapping before the start.
     """
-    places = [(f"subgoal {k}", place) for k, place in enumerate(law.subgoals)]
-    if robot.localised:
-        places.append(("the start", robot.pose))
+    places = [("the start", robot.pose)] if robot.localised else []
     for time, pose in kidnap:
         check_positive("the time of a kidnapping", time, or_zero=True)
         places.append((f"the pose of the kidnapping at {time:g} s", pose))
+    return checked_finite(places)
+
+
+def checked_finite(places):
+    """Named places, if all are finite."""
     for name, place in places:
         if not np.isfinite(place).all():
             raise ValueError(f"{name} must be finite, got {place}")
     return places
+
+
+def check_some_way(ways, obstacles):
+    """Raise ValueError, that of the first, if in every way a named subgoal is not free."""
+    errors = []
+    for subgoals in ways:
+        try:
+            return check_free(subgoals, obstacles)
+        except ValueError as error:
+            errors.append(error)
+    raise errors[0]
 
 
 def check_free(places, obstacles):

@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import multivariate_t
 
 from dollop.cdhmm.alignment import (
-    _compact,
-    _mean_place,
     align_chain,
+    compact,
     estimate_structure,
+    mean_place,
     path_through,
 )
 from dollop.cdhmm.evidence import (
@@ -129,11 +129,11 @@ def test_alignment_is_the_best_of_all(seed):
     sequences = any_sequences(seed, 3, most=4)
     chains = prepared(sequences)
     rest = chains.slices[0].stop
-    labels = _compact(merge_states(np.arange(len(chains.points)) + FIRST, chains))
+    labels = compact(merge_states(np.arange(len(chains.points)) + FIRST, chains))
     labels[:rest] = START
-    labels[rest:] = _compact(labels[rest:])
+    labels[rest:] = compact(labels[rest:])
     graph = graph_of(labels, chains)
-    place = _mean_place(labels, chains, len(graph.n))
+    place = mean_place(labels, chains, len(graph.n))
     aligned, gain = align_chain(chains.points[:rest], graph, labels, chains)
     order = [node for node in topological_order(graph.counts, place) if node >= FIRST]
 
@@ -191,7 +191,7 @@ def test_most_likely_path_is_the_best_of_all(seed):
     random = np.random.default_rng(seed)
     visited = [np.flatnonzero(random.random(6) < 0.5) for _ in range(5)]
     visited = [states for states in visited if len(states)]
-    labels = _compact(np.concatenate(visited))
+    labels = compact(np.concatenate(visited))
     chains = prepared([np.zeros((len(states), 2)) for states in visited])
     counts, n = np.zeros((8, 8), int), np.bincount(labels, minlength=8)
     for part in chains.slices:

@@ -76,7 +76,7 @@ def test_covariances_approach_the_true_ones():
     """Forty demonstrations tell a narrow and a wide direction, though the prior expects neither."""
     random = np.random.default_rng(0)
     sequences = [SLALOM + random.normal(0, (0.05, 0.25), SLALOM.shape) for _ in range(40)]
-    deviations = np.sqrt(np.diagonal(SubgoalHMM.fit(sequences).covariances, axis1=1, axis2=2))
+    deviations = np.sqrt(np.diagonal(SubgoalHMM.fit(sequences, 0.15).covariances, axis1=1, axis2=2))
     assert np.allclose(deviations.mean(0), (0.05, 0.25), atol=0.03)
 
 

@@ -23,7 +23,8 @@ def test_a_corner_is_the_angle_between_the_ways_to_and_from_a_subgoal(turn):
     """Of two straight segments it is the turn between them, but for the last centimetre."""
     away = 2 * np.array([np.cos(np.radians(turn)), np.sin(np.radians(turn))])
     ways = np.linspace([0.0, 0.0], [2.0, 0.0], 40), [2.0, 0.0] + np.linspace([0.0, 0.0], away, 40)
-    law = dollop.SequencedLDS(tuple(dollop.LDS.fit(way) for way in ways), ways[0][0], np.ones(2))
+    shown = {"corners": np.array([True, False])}
+    law = dollop.SequencedLDS(tuple(dollop.LDS.fit(way) for way in ways), ways[0][0], np.ones(2), **shown)
     assert np.degrees(recordings.largest_corner(law)) == pytest.approx(abs(turn), abs=1.0)
 
 
@@ -31,7 +32,8 @@ def test_the_largest_of_the_corners_counts_and_one_segment_has_none():
     """A square walked round: three corners of 90 degrees, of which one is flattened to 45."""
     corners = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [-1, 1]], float)
     ways = [np.linspace(*ends, 40) for ends in pairwise(corners)]
-    law = dollop.SequencedLDS(tuple(dollop.LDS.fit(way) for way in ways), corners[0], np.ones(4))
+    shown = {"corners": np.ones(4, bool)}
+    law = dollop.SequencedLDS(tuple(dollop.LDS.fit(way) for way in ways), corners[0], np.ones(4), **shown)
     assert np.degrees(recordings.largest_corner(law)) == pytest.approx(90, abs=1.0)
     one = dollop.SequencedLDS(law.segments[:1], corners[0], np.ones(1))
     assert recordings.largest_corner(one) == 0

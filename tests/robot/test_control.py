@@ -1,5 +1,7 @@
 """The supervisory control law: the direction of the LDS, and segments that hand over in order."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -46,11 +48,11 @@ def random_law(seed):
     return SequencedLDS(tuple(segments), start, speeds)
 
 
-def straight_law(*goals, speed=0.3):
+def straight_law(*goals, speed=0.3, start=(0.0, 0.0)):
     """One LDS per goal that heads straight for it from anywhere."""
     still = Statistics(np.eye(2), 0.9 * np.eye(2))
     segments = tuple(LDS(still, goal) for goal in goals)
-    return SequencedLDS(segments, np.zeros(2), np.full(len(goals), speed))
+    return SequencedLDS(segments, np.array(start), np.full(len(goals), speed))
 
 
 def trap():
@@ -189,7 +191,7 @@ def test_commands_are_the_formulas(error):
     """Plain: s cos e and 3 e; pursuit: the circle through the point ahead; sharp: turn first."""
     pose = (1.0, 2.0, np.arctan2(2, 4) - error)
     commands = {
-        name: kind(Guidance(straight_law((5, 4))), [0.3], Unicycle(pose)).command(*pose)
+        name: kind(Guidance(straight_law((5, 4), start=pose[:2])), [0.3], Unicycle(pose)).command(*pose)
         for name, kind in CONTROL_LAWS.items()
     }
     turn = np.clip(3 * error, -0.8, 0.8)
@@ -282,3 +284,38 @@ def test_a_kidnapped_robot_begins_its_segment_afresh(jump, pace):
     supervisor.insist()
     supervisor.command(4.0 - jump, 3.0, 0.0)
     assert supervisor.pace == pace and (0 in supervisor.guidance.detours) == (pace < 1)
+
+
+@pytest.mark.parametrize("control", sorted(CONTROL_LAWS))
+def test_the_robot_waits_where_the_demonstrator_did(control):
+    """Three seconds at the first subgoal: so long it stands there, and then goes on."""
+    law = replace(straight_law((2, 0), (4, 0)), pauses=np.array([0.0, 3.0, 0.0]))
+    robot, rows = Unicycle((0.0, 0.0, 0.0)), []
+    supervisor = CONTROL_LAWS[control](Guidance(law), law.speeds, robot)
+    while not supervisor.done:
+        robot.drive(*supervisor.command(*robot.pose))
+        rows.append((supervisor.active, robot.speed))
+    active, speeds = np.array(rows).T
+    assert 0.1 * np.count_nonzero(speeds[5:] == 0) == pytest.approx(3.0, abs=0.8)
+    assert set(active[speeds == 0]) == {1} and not supervisor.hopeless
+
+
+@pytest.mark.parametrize("control", sorted(CONTROL_LAWS))
+def test_the_robot_drives_at_the_speed_shown_there(control):
+    """Slow in the first half and fast in the second, within what the robot can."""
+    profile = np.array([[0.2, 0.2, 0.4, 0.4]])
+    law = replace(straight_law((4, 0)), profile=profile, speeds=np.array([0.8 / 3]))
+    for x, speed in ((0.5, 0.2), (3.0, 0.4)):
+        supervisor = CONTROL_LAWS[control](Guidance(law), law.speeds, Unicycle((x, 0.0, 0.0)))
+        assert supervisor.command(x, 0.0, 0.0) == pytest.approx((speed, 0.0), abs=1e-6)
+
+
+def test_pursuit_comes_back_to_the_shown_way(law):
+    """Put half a metre aside, it is back within 5 cm after two metres, and stays there."""
+    shown = law.response()
+    k = len(shown) // 3
+    across = (shown[k + 1] - shown[k - 1]) @ [[0, 1], [-1, 0]]
+    place = shown[k] + 0.5 * across / np.hypot(*across)
+    segment = int(np.searchsorted(np.cumsum([len(part) for part in law.responses()]), k, side="right"))
+    back = np.array(Guidance(law).way(segment, *place)[0])
+    assert distance_to_polyline(back[40:], shown).max() < 0.05

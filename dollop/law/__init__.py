@@ -1,0 +1,1 @@
+"""What a control law does between its subgoals: the line it keeps to, and when (beyond the paper)."""

@@ -1,0 +1,309 @@
+"""One way of doing a task: places tied to objects, and the walk that they carry along (Sec. IV-B, beyond the paper).
+
+Where the objects stand elsewhere, the places do, and the walk is displaced with them; the law is what is fitted to the
+walk that results (Sec. III), so that it keeps its tolerance in every environment.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from dollop.learning.frames import frames_like
+from dollop.learning.places import Places
+from dollop.learning.ways import PLACES
+from dollop.pose import rotation
+from dollop.sequenced_lds import SequencedLDS
+from dollop.trajectory import align, arc_length, resample
+
+__all__ = ["Way", "curve_of", "way_of", "which_places"]
+
+LOOSER = 4
+"""Times that the tolerance of a law is doubled where objects bend its way too sharply."""
+SLOWER, FASTER = 0.2, 5.0
+"""Most that a step of a walk may be shortened or stretched and still take the time that its new length takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """One way of doing a task (beyond the paper).
+
+    Attributes
+    ----------
+    walks : tuple of (N_k, 2) float arrays
+        What was shown, in m: of one demonstration its own walks, of several their mean, at the pace of all.
+    shares : tuple of (N_k,) float arrays
+        Where along the places each sample of a walk is, from 0 to L - 1.
+    home : (L, 2) float array
+        Where the places are among the objects as they stood for these walks, in m.
+    weights, local : (L, F) and (L, F, 2) float arrays
+        As of `Places`.
+    objects, turning : (F,) int and bool arrays
+        Which object each frame is, and whether it turns with it; see `Frames`.
+    members : tuple of int
+        The demonstrations that went this way.
+    covered : tuple of (float, float)
+        From which share of the way to which each of them was seen.
+    sample_period : float
+        Of the walks, in s.
+    tolerance : float
+        Largest mean error of a segment of the law in m.
+    """
+
+    walks: tuple
+    shares: tuple
+    home: np.ndarray
+    weights: np.ndarray
+    local: np.ndarray
+    objects: np.ndarray
+    turning: np.ndarray
+    members: tuple
+    covered: tuple
+    sample_period: float
+    tolerance: float
+
+    def __repr__(self):
+        return f"Way of {len(self.home)} places, shown {len(self.members)} x"
+
+    @cached_property
+    def places(self):
+        """The places and what they follow."""
+        return Places(self.weights, self.local, None, None)
+
+    def among(self, environment, partners, turn=0.0):
+        """Where the places are in an environment.
+
+        Parameters
+        ----------
+        environment : Environment
+        partners : (M,) int array
+            For each of its objects, which object of the way it is; -1 for none.
+        turn : float
+            By which offsets from objects whose direction is not known are turned, in rad.
+
+        Returns
+        -------
+        (L, 2) float array
+            In m.
+
+        Raises
+        ------
+        ValueError
+            Where a place follows only what is not there.
+        """
+        frames = frames_like(self.objects, self.turning, environment, partners)
+        places = self.places
+        if turn:
+            still = ~self.turning & (self.objects >= 0)
+            local = self.local.copy()
+            local[:, still] = local[:, still] @ rotation(turn).T
+            places = replace(places, local=local)
+        found = places.among(frames)[0]
+        lost = np.flatnonzero(np.isnan(found[:, 0]))
+        if len(lost):
+            followed = np.unique(self.objects[self.weights[lost[0]] > 0]).tolist()
+            rule = "a place needs one of the objects that it follows to be matched"
+            raise ValueError(f"{rule}, but the matching leaves out all of place {lost[0]}: objects {followed}")
+        return found
+
+    def walked(self, now):
+        """The walks where the places are now, at the speeds that were shown.
+
+        Parameters
+        ----------
+        now : (L, 2) float array
+            Places in m.
+
+        Returns
+        -------
+        list of (N_k, 2) float arrays
+            In m.
+        """
+        if np.allclose(now, self.home, rtol=0, atol=1e-9):
+            return list(self.walks)
+        displaced = scipy.interpolate.CubicSpline(np.arange(len(now)), now - self.home)
+        pairs = zip(self.walks, self.shares, strict=True)
+        return [_at_shown_speed(walk, walk + displaced(share)) for walk, share in pairs]
+
+    def law(self, now):
+        """The control law along the places as they are now (Sec. III).
+
+        Parameters
+        ----------
+        now : (L, 2) float array
+            Places in m.
+
+        Returns
+        -------
+        law : SequencedLDS
+        tolerance : float
+            That it keeps, in m: larger than the way's where it bends too sharply for that, as the
+            walks that were shown do not.
+
+        Raises
+        ------
+        ValueError
+            Where the walks that were shown cannot be segmented at their tolerance.
+        """
+        walks, tolerance = self.walked(now), self.tolerance
+        for _ in range(LOOSER):
+            try:
+                return SequencedLDS.fit(walks, tolerance, sample_period=self.sample_period), tolerance
+            except ValueError:
+                if walks[0] is self.walks[0] and len(self.members) == 1:
+                    raise
+                tolerance *= 2
+        return SequencedLDS.fit(walks, tolerance, sample_period=self.sample_period), tolerance
+
+
+def _at_shown_speed(before, after):
+    """A walk (N, 2) moved from `before`, sampled anew so that each step keeps its speed."""
+    was, now = (np.linalg.norm(np.diff(walk, axis=0), axis=1) for walk in (before, after))
+    stretched = np.clip(now / np.maximum(was, 1e-9), SLOWER, FASTER)
+    time = np.concatenate([[0.0], np.where(was > 1e-9, stretched, 1.0).cumsum()])
+    count = max(3, round(time[-1]) + 1)
+    at = np.linspace(0, time[-1], count)
+    return np.stack([np.interp(at, time, column) for column in after.T], axis=1)
+
+
+def curve_of(walks):
+    """The places of a demonstration: `PLACES` at equal distances along the mean of its walks.
+
+    Parameters
+    ----------
+    walks : list of (N_k, 2) float arrays
+        In m.
+
+    Returns
+    -------
+    curve : (PLACES, 2) float array
+        In m.
+    moments : list of (PLACES,) float arrays
+        At which sample each walk is there, as fractional numbers.
+    """
+    if len(walks) == 1:
+        lengths = arc_length(walks[0])
+        even = np.linspace(0, lengths[-1], PLACES)
+        return resample(walks[0], PLACES), [np.interp(even, lengths, np.arange(len(lengths)))]
+    aligned, shares = align(walks, 2 * PLACES - 1)
+    mean = aligned.mean(axis=0)
+    along = arc_length(mean)
+    even = np.interp(np.linspace(0, along[-1], PLACES), along, np.arange(len(mean)))
+    curve = np.stack([np.interp(even, np.arange(len(mean)), column) for column in mean.T], axis=1)
+    moments = []
+    for walk, share in zip(walks, shares, strict=True):
+        lengths = arc_length(walk)
+        there = np.interp(even, np.arange(len(share)), share) * lengths[-1]
+        moments.append(np.interp(there, lengths, np.arange(len(walk))))
+    return curve, moments
+
+
+def way_of(members, laid, frames, home, shown, curves):
+    """A way from the walks that were laid onto it.
+
+    Parameters
+    ----------
+    members : (K,) int array
+        Which demonstrations.
+    laid : Laid
+        Their walks.
+    frames : Frames
+        Of these demonstrations.
+    home : Frames
+        Of the environment to learn in.
+    shown : sequence of K demonstrations
+        With `walks`, `sample_period` and `tolerance`.
+    curves : sequence of K (curve, moments)
+        From `curve_of`.
+
+    Returns
+    -------
+    Way
+    """
+    places = laid.places
+    known = places.weights, places.local, frames.objects, frames.turning, tuple(members.tolist())
+    covered = tuple(_range_of(row) for row in laid.covered)
+    tolerance = min(each.tolerance for each in shown)
+    period = float(np.median([each.sample_period for each in shown]))
+    if len(members) == 1:
+        walks = tuple(shown[0].walks)
+        shares = tuple(_share_of(walk, at) for walk, at in zip(walks, curves[0][1], strict=True))
+        at_home = laid.points[0]
+    else:
+        at_home = places.among(home)[0]
+        pace = _pace(laid, shown, curves)
+        walk, share = _timed(at_home, pace, period)
+        walks, shares = (walk,), (share,)
+    return Way(walks, shares, at_home, *known, covered, period, tolerance)
+
+
+def _range_of(covered):
+    """From which share of the way to which the places (L,) that are covered reach."""
+    inside = np.flatnonzero(covered)
+    return (
+        (float(inside[0] / (len(covered) - 1)), float(inside[-1] / (len(covered) - 1))) if len(inside) else (0.0, 0.0)
+    )
+
+
+def _share_of(walk, moments):
+    """Where along the places (L,), at moments of a walk, each of its samples is."""
+    keep = np.r_[True, np.diff(moments) > 0]
+    return np.interp(np.arange(len(walk)), moments[keep], np.flatnonzero(keep))
+
+
+def _pace(laid, shown, curves):
+    """Mean time (L - 1,) in s from each place to the next, over all walks that were seen there."""
+    taken, weight = np.zeros(PLACES - 1), np.zeros(PLACES - 1)
+    for at, covered, each, (_, moments) in zip(laid.at, laid.covered, shown, curves, strict=True):
+        both = covered[1:] & covered[:-1]
+        for moment in moments:
+            times = np.interp(at, np.arange(PLACES), moment) * each.sample_period
+            taken += np.diff(times) * both
+            weight += both
+    typical = taken.sum() / max(weight.sum(), 1)
+    return np.where(weight > 0, taken / np.maximum(weight, 1), typical)
+
+
+def _timed(places, pace, period):
+    """A walk along places (L, 2) that takes `pace` (L - 1,) in s between them, and its share along them."""
+    pace = np.maximum(pace, 1e-3 * period)
+    time = np.concatenate([[0.0], pace.cumsum()])
+    count = max(3, round(time[-1] / period) + 1)
+    share = np.interp(np.linspace(0, time[-1], count), time, np.arange(len(places)))
+    return scipy.interpolate.CubicSpline(np.arange(len(places)), places)(share), share
+
+
+def which_places(points, places):
+    """Which place each of some points belongs to, in order along the way.
+
+    Parameters
+    ----------
+    points : (K, 2) float array
+        In m, in the order of the way.
+    places : (L, 2) float array
+        In m.
+
+    Returns
+    -------
+    (K,) int array
+        Never falling, of the least sum of squared distances.
+
+    Examples
+    --------
+    Of two visits to one place the later one is the later point's.
+
+    >>> way = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0], [0.0, -1.0]])
+    >>> which_places(np.array([[0.0, 0.0], [1.0, 0.9], [0.0, 0.1]]), way).tolist()
+    [0, 2, 3]
+    """
+    squares = ((points[:, None] - places) ** 2).sum(axis=2)
+    total, came = squares[0], []
+    for row in squares[1:]:
+        best = np.where(total == np.minimum.accumulate(total), np.arange(len(total)), 0)
+        came.append(np.maximum.accumulate(best))
+        total = row + total[came[-1]]
+    at = [int(np.argmin(total))]
+    for best in came[::-1]:
+        at.append(int(best[at[-1]]))
+    return np.array(at[::-1])

@@ -1,0 +1,499 @@
+"""Which way of a task a robot drives, and when it changes to another (beyond the paper).
+
+A task that was shown in several ways has a law for each. What a way is like among obstacles is
+found by rolling its response out twice, with obstacles and without. It is *free* where the one
+keeps near the other,
+
+    max_p min_q |p - q| <= 2 r + d    in every segment, p on the one, q on the other,
+
+with r the robot's radius and d the distance within which obstacles turn it: so far aside it may be
+led by a thing no wider than itself. What leads it farther off is no thing to go round, but closes
+the way.
+
+The way in force is blocked where the robot makes no progress, or where a new obstacle closes it.
+Then it changes to another way that is free, at the nearest place by driving that lies no farther
+along than the robot has come.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil, cos, inf, isfinite, sin
+
+import numpy as np
+
+from dollop.robot.avoidance import INFLUENCE, KEPT, Geodesic
+from dollop.robot.control import CONTROL_LAWS, PATIENCE, REACH, STEP, Guidance
+from dollop.trajectory import distance_to_polyline
+
+__all__ = ["Way", "WayKeeper", "counterpart", "extra_length", "fitting"]
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """One way of doing a task (beyond the paper).
+
+    Attributes
+    ----------
+    index : int
+        Among the ways of the task, the most often shown first.
+    law : SequencedLDS
+    shown : int
+        How often it was shown.
+    """
+
+    index: int
+    law: object
+    shown: int = 1
+
+    @cached_property
+    def _response(self):
+        """Places (M, 2) in m on the response from the way's start, 5 cm apart; segments (M,)."""
+        return tuple(map(np.array, Guidance(self.law).way(0, *self.law.start.tolist())))
+
+    @property
+    def places(self):
+        """(M, 2) float array: the response from the demonstrations' start, 5 cm apart, in m."""
+        return self._response[0]
+
+    @property
+    def segments(self):
+        """(M,) int array: the segment that each place belongs to."""
+        return self._response[1]
+
+    def leg(self, k):
+        """The places of one segment.
+
+        Parameters
+        ----------
+        k : int
+            The segment.
+
+        Returns
+        -------
+        (L, 2) float array
+            In m, from the subgoal before on.
+        """
+        first, end = np.searchsorted(self.segments, [k, k + 1])
+        return self.places[min(max(first - 1, 0), len(self.places) - 1) : max(end, 1)]
+
+    def nearest(self, k, x, y):
+        """The place in a segment that is nearest to a robot.
+
+        Parameters
+        ----------
+        k : int
+            The segment.
+        x, y : float
+            Where the robot is, in m.
+
+        Returns
+        -------
+        int
+            Index into `places`.
+        """
+        end = np.searchsorted(self.segments, k + 1)
+        leg = self.leg(k)
+        return int(end - len(leg) + np.hypot(*(leg - [x, y]).T).argmin())
+
+
+def extra_length(way, obstacles, k, x, y):
+    """How much longer obstacles make a way, where they close it (reconstruction).
+
+    Parameters
+    ----------
+    way : Way
+    obstacles : ObstacleMap or None
+    k : int
+        The segment to begin with.
+    x, y : float
+        Where to begin, in m.
+
+    Returns
+    -------
+    float
+        In m. 0 where the way is free: where it is led aside nowhere by more than what a thing as
+        wide as the robot needs. `inf` where it does not get through, or where a subgoal is off the
+        map or in an obstacle.
+
+    Examples
+    --------
+    A stool is gone round; a wall of 6 m is not.
+
+    >>> from dollop.environment import Environment
+    >>> from dollop.robot.avoidance import ObstacleMap
+    >>> from dollop.sequenced_lds import SequencedLDS
+    >>> way = Way(0, SequencedLDS.fit(np.linspace([0.0, 0.0], [6.0, 0.0], 50)))
+    >>> for box in ([2.8, -0.2, 3.2, 0.1], [2.8, -3.0, 3.2, 3.0]):
+    ...     obstacles = ObstacleMap.of(Environment([box]), places=[[0, 0], [6, 0]])
+    ...     print(extra_length(way, obstacles, 0, 0.0, 0.0) > 0)
+    False
+    True
+    """
+    if obstacles is None:
+        return 0.0
+    if not all(_can_be(obstacles, *goal) for goal in way.law.subgoals[k:].tolist()):
+        return inf
+    guidance = Guidance(way.law, obstacles)
+    led, segments = map(np.array, guidance.way(k, x, y))
+    closed, end = False, led[0]
+    for segment in range(k, len(way.law.segments)):
+        leg = led[segments == segment]
+        end = leg[-1] if len(leg) else end
+        if not guidance.reached(segment, *end, STEP):
+            return inf
+        closed |= len(leg) and _astray(leg, way.leg(segment), obstacles)
+    own = len(way.places) - way.nearest(k, x, y)
+    return max(STEP * (len(led) - own), STEP) if closed else 0.0
+
+
+def _can_be(obstacles, x, y):
+    """Whether a place in m is on the map and in no obstacle."""
+    return obstacles.holds(x, y) and obstacles.edge(x, y) > -obstacles.radius
+
+
+def _astray(leg, own, obstacles):
+    """Whether places (N, 2) are led farther from a way's own (M, 2) than round what is gone round."""
+    return distance_to_polyline(leg, own).max() > 2 * obstacles.radius + INFLUENCE
+
+
+def counterpart(way, other, at):
+    """The place of another way that is as far along as a place of this one (reconstruction).
+
+    What both have in common at the beginning and at the end counts by length, what lies between by
+    its share: two ways round a table have come equally far half-way round it.
+
+    Parameters
+    ----------
+    way, other : Way
+    at : int
+        Index into `way.places`.
+
+    Returns
+    -------
+    int
+        Index into `other.places`.
+
+    Examples
+    --------
+    >>> from dollop.sequenced_lds import SequencedLDS
+    >>> left, right = (Way(0, SequencedLDS.fit([[0, 0], [1, y], [2, 0.0]])) for y in (-1.0, 1.0))
+    >>> half = len(left.places) // 2
+    >>> abs(counterpart(left, right, half) - half) <= 1
+    True
+    """
+    near = distance_to_polyline(way.places, other.places) <= REACH
+    near_other = distance_to_polyline(other.places, way.places) <= REACH
+    size, size_other = len(near), len(near_other)
+    before = min(_run_of_true(near), _run_of_true(near_other))
+    after = min(_run_of_true(near[::-1]), _run_of_true(near_other[::-1]))
+    after = min(after, size - before, size_other - before)
+    if at < before:
+        return at
+    if at >= size - after:
+        return size_other - size + at
+    share = (at - before) / (size - before - after)
+    return before + int(share * (size_other - before - after))
+
+
+def _run_of_true(flags):
+    """How many flags (N,) are true before the first that is not."""
+    return int(np.append(flags, False).argmin())
+
+
+@dataclass(frozen=True)
+class _Option:
+    """A way to be driven from a segment on: how much longer it gets, how far off it is, in m."""
+
+    way: Way
+    segment: int
+    extra: float
+    misfit: float
+
+
+def fitting(options):
+    """Of ways that could be driven, the one to drive (reconstruction).
+
+    Parameters
+    ----------
+    options : sequence
+        Each with `extra` (m, how much longer obstacles make it), `misfit` (m, how far the robot is
+        off it) and `way`, a `Way`.
+
+    Returns
+    -------
+    object
+        One of the options. A free one before one that is closed; of these the one that fits best,
+        of those that fit as well within 0.25 m the one shown most often.
+    """
+    least = min(each.extra for each in options)
+    options = [each for each in options if each.extra == least]
+    off = min(each.misfit for each in options)
+    options = [each for each in options if each.misfit <= off + REACH]
+    return max(options, key=lambda each: (each.way.shown, -each.way.index))
+
+
+class WayKeeper:
+    """Which way is in force, and the supervisor that drives it (reconstruction).
+
+    Parameters
+    ----------
+    laws : sequence of SequencedLDS
+        One for each way, the most often shown first.
+    shown : sequence of int
+        How often each was shown.
+    robot : Unicycle, or another
+    control : str
+        A name of `CONTROL_LAWS`.
+    chart : callable
+        Makes an ObstacleMap of boxes (N, 4) in m that stand there beside what is known.
+    avoid : bool
+        Go round obstacles.
+
+    Attributes
+    ----------
+    known : ObstacleMap
+        What is known to stand there.
+    way : int
+        Index of the way in force.
+    left : dict of int to (float, float)
+        The ways that the robot has left because it made no progress, and where in m.
+    supervisor : Supervisor
+        Of the way in force.
+    """
+
+    def __init__(self, laws, shown, robot, control, chart, avoid=True):
+        self.ways = [Way(i, law, n) for i, (law, n) in enumerate(zip(laws, shown, strict=True))]
+        self.robot, self.control, self.chart, self.avoid = robot, control, chart, avoid
+        self.noticed, self.felt, self.left = np.empty((0, 4)), np.empty((0, 4)), {}
+        self.begun = len(self.ways) == 1
+        self.remap()
+        self.enter(self.ways[0], 0)
+
+    @property
+    def active(self):
+        """Int: the segment in force, of the way in force."""
+        return self.supervisor.active
+
+    @property
+    def done(self):
+        """Bool: whether the last segment of the way in force has handed over."""
+        return self.supervisor.done
+
+    @property
+    def hopeless(self):
+        """Bool: whether there is no progress, and no other way to change to."""
+        return self.supervisor.hopeless
+
+    @property
+    def reason(self):
+        """Where there is no progress, of which way, and what is the matter with the others."""
+        told = f"no progress towards subgoal {self.active}"
+        if len(self.ways) == 1:
+            return told
+        others = (self._tell(way.index) for way in self.ways if way.index != self.way)
+        return f"{told} of way {self.way} ({', '.join(others)})"
+
+    def _tell(self, way):
+        """What is the matter with a way that is not in force."""
+        if way not in self.left:
+            return f"way {way} is closed"
+        return "way {} was left at ({:.2f}, {:.2f})".format(way, *self.left[way])
+
+    def remap(self):
+        """Map what is known to stand there, and what the robot has felt."""
+        self.known = self.chart(self.noticed)
+        felt = self.chart(np.vstack([self.noticed, self.felt])) if len(self.felt) else self.known
+        self.obstacles = felt if self.avoid else None
+
+    def enter(self, way, segment):
+        """Put a way in force, from a segment on.
+
+        Parameters
+        ----------
+        way : Way
+        segment : int
+        """
+        self.way, guidance = way.index, Guidance(way.law, self.obstacles)
+        self.supervisor = CONTROL_LAWS[self.control](guidance, way.law.speeds, self.robot)
+        if segment:
+            self.supervisor.hand_over(segment)
+
+    def command(self, x, y, theta):
+        """v in m/s and omega in rad/s for a pose, on the way that fits and is free.
+
+        Parameters
+        ----------
+        x, y, theta : float
+            Pose in m and rad.
+
+        Returns
+        -------
+        (float, float)
+        """
+        self.notice(x, y)
+        if len(self.ways) > 1 and self.out_of_patience(x, y):
+            self.leave(x, y, theta, longest=0.0)
+        command = self.supervisor.command(x, y, theta)
+        if len(self.ways) > 1 and self.hopeless and self.leave(x, y, theta, longest=inf):
+            command = self.supervisor.command(x, y, theta)
+        return command
+
+    def begin(self, x, y):
+        """Put the way in force that fits the start and is free, once.
+
+        A robot at the start of a way takes one that starts there; elsewhere one on which it stands.
+
+        Parameters
+        ----------
+        x, y : float
+            In m.
+        """
+        if self.begun:
+            return
+        self.begun = True
+        self._has_noticed()
+        from_starts = [float(np.hypot(*(way.law.start - [x, y]))) for way in self.ways]
+        misfits = from_starts
+        if min(from_starts) > REACH:
+            misfits = [float(distance_to_polyline([[x, y]], way.places)[0]) for way in self.ways]
+        last = [way.segments.searchsorted(1) - 1 for way in self.ways]
+        options = self.options(self.ways, last, x, y)
+        pairs = zip(options, misfits, strict=True)
+        options = [replace(each, segment=0, misfit=off) for each, off in pairs]
+        self.enter(fitting(options).way, 0)
+
+    def options(self, ways, last, x, y):
+        """How ways could be joined by a robot, each at the nearest place up to a last one.
+
+        Parameters
+        ----------
+        ways : sequence of Way
+        last : sequence of int
+            Indices into their `places`.
+        x, y : float
+            Where the robot is, in m.
+
+        Returns
+        -------
+        list
+            As `fitting` takes them.
+        """
+        geodesic = Geodesic(self.obstacles, (x, y)) if self.obstacles else None
+        return [self._option(way, end, geodesic, x, y) for way, end in zip(ways, last, strict=True)]
+
+    def _option(self, way, last, geodesic, x, y):
+        places = way.places[: max(last, 0) + 1]
+        away = np.hypot(*(places - [x, y]).T)
+        if geodesic:
+            away = np.array([geodesic.distance(*place) for place in places.tolist()])
+            away[self.obstacles.edges(places) <= 0] = inf
+        at = int(away.argmin())
+        segment = int(way.segments[at])
+        reached = isfinite(away[at])
+        extra = extra_length(way, self.obstacles, segment, *places[at].tolist()) if reached else inf
+        return _Option(way, segment, extra, float(away[at]))
+
+    def others(self, x, y):
+        """The ways that the robot could change to, as `fitting` takes them.
+
+        Parameters
+        ----------
+        x, y : float
+            Where the robot is, in m.
+
+        Returns
+        -------
+        list
+        """
+        here = self.ways[self.way]
+        at = here.nearest(self.active, x, y)
+        ways = [way for way in self.ways if way.index != self.way and way.index not in self.left]
+        return self.options(ways, [counterpart(here, way, at) for way in ways], x, y)
+
+    def notice(self, x, y):
+        """Map what the robot has noticed, and change where that closes the way in force.
+
+        Parameters
+        ----------
+        x, y : float
+            Where the robot is, in m.
+        """
+        if not self._has_noticed() or self.obstacles is None:
+            return
+        here = self.ways[self.way]
+        extra = extra_length(here, self.obstacles, self.active, x, y)
+        stay = _Option(here, self.active, extra, 0.0)
+        others = self.others(x, y) if stay.extra > 0 and len(self.ways) > 1 else []
+        best = min([stay, *others], key=lambda each: each.extra)
+        best = fitting([each for each in others if each.extra == 0] or [best])
+        self.enter(best.way, best.segment)
+
+    def _has_noticed(self):
+        """Whether the robot has noticed something new, which is then mapped."""
+        noticed = getattr(self.robot, "noticed", None)
+        if noticed is None or np.array_equal(noticed.boxes, self.noticed):
+            return False
+        self.noticed = noticed.boxes
+        self.remap()
+        return True
+
+    def out_of_patience(self, x, y):
+        """Whether there has been no progress for so long that the way counts as blocked.
+
+        It does not where the map tells that a detour is needed that is not taken yet.
+
+        Parameters
+        ----------
+        x, y : float
+            Where the robot is, in m.
+
+        Returns
+        -------
+        bool
+        """
+        supervisor, k = self.supervisor, self.active
+        if supervisor.waited + supervisor.period <= PATIENCE:
+            return False
+        guidance = Guidance(self.ways[self.way].law, self.obstacles)
+        guidance.way(k, x, y)
+        return k in supervisor.guidance.detours or k not in guidance.detours
+
+    def leave(self, x, y, theta, longest):
+        """Change to another way, if obstacles make one longer by no more than some length.
+
+        What stands in the way, though the map does not tell, is taken to be as wide as what closes
+        a way.
+
+        Parameters
+        ----------
+        x, y, theta : float
+            Pose in m and rad.
+        longest : float
+            In m; 0 for a free one.
+
+        Returns
+        -------
+        bool
+            Whether there was one.
+        """
+        felt, self.felt = self.felt, np.vstack([self.felt, self._ahead(x, y, theta)])
+        self.remap()
+        others = filter(lambda each: isfinite(each.extra), self.others(x, y))
+        options = [each for each in others if each.extra <= longest]
+        if not options:
+            self.felt = felt
+            return False
+        self.left[self.way] = x, y
+        best = fitting(options)
+        self.enter(best.way, best.segment)
+        return True
+
+    def _ahead(self, x, y, theta):
+        """Boxes (N, 4) in m: a bar across what lies ahead, as far off as is kept from obstacles."""
+        radius = self.known.radius
+        half, width = radius / 2**0.5, 2 * radius + INFLUENCE
+        along, across = np.array([cos(theta), sin(theta)]), np.array([-sin(theta), cos(theta)])
+        count = ceil(width / half)
+        aside = np.linspace(-width, width, count)[:, None] * across
+        centres = np.array([x, y]) + (2 * radius + KEPT) * along + aside
+        return np.hstack([centres - half, centres + half])
