@@ -1,9 +1,9 @@
-"""Tasks among objects, drawn at random by a generator that knows nothing of the model that is learned.
+"""Tasks among objects, drawn at random by a generator that knows nothing of what is learned.
 
-A task is a few via-points, each at a fixed offset from one of some objects; other objects play no part. In a layout,
-the person walks a spline through the via-points where they are there, each missed by a scatter, with a sway along the
-way and noise on each sample, so that no two walks are alike. What the person would do without scatter, sway and noise
-is the truth in that layout.
+A task is a few via-points, each at a fixed offset from one of some objects; other objects play no
+part. In a layout, the person walks a spline through the via-points where they are there, each missed
+by a scatter, with a sway along the way and noise on each sample, so that no two walks are alike.
+What the person would do without scatter, sway and noise is the truth in that layout.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ ROOM, APART, BOX = 6.0, 0.9, (0.25, 0.6)
 MOST = 20
 """Objects that a room of that size surely holds that far apart."""
 MOVED = 0.5
-"""m by which each object of a layout that is "moved" stands elsewhere than in the first."""
+"""m by which each object of a layout that is "moved" stands off one and the same place."""
 KINDS = ("anywhere", "moved", "still")
 
 
@@ -109,7 +109,9 @@ class DrawnTask:
 
 
 def draw_task(n_objects, rng, followed=None):
-    """Draw a task of 4 to 7 via-points beside two objects at least, neighbours mostly beside different ones.
+    """Draw a task of 4 to 7 via-points beside two objects at least.
+
+    Via-points that follow each other are mostly beside different objects.
 
     Parameters
     ----------
@@ -177,7 +179,8 @@ def draw_layouts(n_objects, count, rng, kind="anywhere"):
     rng : numpy.random.Generator
         Source of chance.
     kind : {"anywhere", "moved", "still"}
-        Each drawn anew; each object 0.5 m from where it stands in the first one, in any direction; or all the same.
+        Each drawn anew; in each every object 0.5 m, in any direction, from one and the same place;
+        or all the same.
 
     Returns
     -------
@@ -219,13 +222,15 @@ def way_through(via, knots=0.5, ends="natural", samples=120):
 
     Examples
     --------
-    >>> way_through(np.array([[0.0, 0.0], [3.0, 0.0], [4.0, 0.0]]), knots=1.0, samples=5).round(6).tolist()
+    >>> via = np.array([[0.0, 0.0], [3.0, 0.0], [4.0, 0.0]])
+    >>> way_through(via, knots=1.0, samples=5).round(6).tolist()
     [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [4.0, 0.0]]
     """
     at = np.r_[0, np.maximum(np.hypot(*np.diff(via, axis=0).T), 1e-3) ** knots].cumsum()
     way = scipy.interpolate.CubicSpline(at, via, bc_type=ends)(np.linspace(0, at[-1], 20 * samples))
     length = np.r_[0, np.hypot(*np.diff(way, axis=0).T).cumsum()]
-    return np.stack([np.interp(np.linspace(0, length[-1], samples), length, c) for c in way.T], axis=1)
+    even = np.linspace(0, length[-1], samples)
+    return np.stack([np.interp(even, length, axis) for axis in way.T], axis=1)
 
 
 def walked(task, centres, rng, scatter=0.05, sway=0.03, noise=0.01):
@@ -285,7 +290,8 @@ def size_of(way):
 def other_way(task, rng):
     """The same task done in another way, from the same beginning to the same end.
 
-    Between them, most via-points are on the other side of their object, and half of those beside any object.
+    Between them, most via-points are on the other side of their object, and half of those beside
+    any object.
 
     Parameters
     ----------

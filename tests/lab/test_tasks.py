@@ -22,7 +22,7 @@ def test_the_way_passes_its_via_points_wherever_the_objects_stand(seed):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_layouts_are_of_the_kind_that_was_asked_for(kind):
-    """Still ones are all the first; moved ones differ from it by 0.5 m an object, others are drawn anew."""
+    """Still ones are all the same; moved ones have each object 0.5 m off one place; others are drawn anew."""
     layouts = np.array(draw_layouts(4, 30, np.random.default_rng(3), kind))
     assert layouts.shape == (30, 4, 2)
     if kind == "still":
