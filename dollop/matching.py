@@ -6,28 +6,30 @@ centimetres in a box outweighs where the boxes stand.
 
 The robust method, the default, is a reconstruction. It matches objects first and corners after, and
 tells how probable that is, by one model for every number of objects. K objects stand in a room of
-area A, K unknown, and each is in view of either environment with its own probability. From one to
-the other most are shifted a little and some are carried off, so that object a at x and object b at
-y are the same with the density
+area A, K unknown, with the prior 1 / K. Some were not touched, most were shifted a little, a few
+were carried off, so that object a at x and object b at y are the same with the density
 
-    f(a, b) = 0.9 N(y; h(x), sigma^2) + 0.1 / A        where it stands, sigma = 0.4 m per axis
-    s(a, b) = 0.95 N(size_b; size_a) + 0.05 B          how large it looks, B = 1 per m^2
+    f(a, b) = (1 - c) (u N(y; h(x), blur) + (1 - u) N(y; h(x), blur + sigma^2)) + c / A
+    s(a, b) = 0.98 N(size_b; size_a) + 0.02 B
 
-An object that is not found in the other environment has gone (one in twenty), or where it would
-stand was not seen: p, averaged over where it may have been moved, is how surely it was. All it costs
-is q = 1 - 0.95 p. Where nobody knows what was seen p is anything from 1/2 to 1, the same for all. A
-new object is of a size g as others beside it are, or of any. A matching of k pairs then has the
-probability
+with `blur` what the sides of boxes are off, B the density of any size, at most 2 per m^2, and g that of a
+new object: a size of those beside it, or any. An object that is left out has gone, one in twenty,
+or stands where the other environment has not seen: all it costs is q = 1 - 0.95 p, where p says how
+surely its place was seen, averaged over where it may have been moved. Where nobody knows what was
+seen, p is the same for all, and unknown. A matching of k pairs then has the probability
 
-    P = 1/Z  w_k  prod_(a, b)  A f(a, b) s(a, b) / sqrt(g_a g_b)  *  sqrt((1 - q_a) (1 - q_b)) / (q_a q_b)
+    w_k / Z  product of  A f s / sqrt(g_a g_b) * sqrt((1 - q_a) (1 - q_b))  over its pairs (a, b)
+             product of  q  over all that is left out
 
-where w_k = (N + M - k - 1)! counts the ways to scatter the distinct objects, K having the prior
-1 / K, and holds the average over p where that is unknown. Z sums over all partial matchings: a sum
-over sets of columns (exact, up to twelve objects), by belief propagation for more. What a layout
-was as a whole before, h, is summed over too: in place; shifted anywhere, 6 nats less likely
-beforehand; turned by any angle, 4; both, 10; or put up anew without regard to what was (f = 1 / A),
-3. Each shift or turn counts with the room that its uncertainty takes of all shifts and turns there
-are (Laplace): of two objects some turn fits always, and that is no evidence.
+where w_k = (N + M - k - 1)! counts in how many ways K may be made of them. Z is the sum over all
+partial matchings: row by row over sets of columns, exactly, up to twelve objects; by belief
+propagation for more. What nobody knows is summed over as well: sigma, half, once or one and a half
+times 0.4 m; u, none or a half; c, 0.01 or 0.1; p, from a half to 1; and whether sizes tell anything
+at all, in one scene of ten not. So is what h did to the layout
+as a whole: nothing; shift it anywhere, 4 nats less likely beforehand; turn it by any angle, 4; both,
+8; or put it up anew, 1.4, where f = 1 / A and p may be anything. Each shift or turn counts with the
+room that it is uncertain by, of all that there are (Laplace): some turn fits any two objects, and
+that is no evidence.
 """
 
 from dataclasses import dataclass, replace
@@ -53,8 +55,10 @@ _SPREADS, _STILL, _CARRIED = (0.5, 1.0, 1.5), (0.0, 0.5), (0.01, 0.1)
 _FOUND = 0.95  # of all objects that stand where it was seen; the others have gone or were missed
 _REACHED, _ASSUMED = 0.035, 0.3  # m, sd of a side that a beam reached, and of another
 _MEASURED, _MISJUDGED = 0.98, 0.02  # so often a size is off by that, and by anything
-_ANY_SIZE = 2.0  # B, 1/m^2: the sides of things are anything within 0.7 m
-_VISIBLE = np.sin(pi / 4 + pi / 40 * np.arange(0.5, 10)) ** 2  # p where unknown: Jeffreys, from 1/2
+_SIZES = 0.28  # m, sd of the sides of things: as a density 2 per m^2, for what is measured exactly
+_ANY = np.sin(pi / 40 * np.arange(0.5, 20)) ** 2  # a probability, unknown (Jeffreys)
+_VISIBLE = _ANY[10:]  # p, where nobody knows what was seen: most of it
+_UNTOLD = 0.1  # so often sizes tell nothing at all: seen in part, or by cells
 _ALIKE = np.linspace(0.05, 0.95, 10)  # share of the objects that are of the size of another
 _SHIFTED, _TURNED, _ANEW = 4.0, 4.0, 1.4  # nats
 _KAPPA = 1.0  # of the turns, von Mises: small ones are a little likelier
@@ -157,7 +161,8 @@ class Matching:
         partners = given.astype(int)
         taken = np.sort(partners[partners >= 0])
         if (partners != given).any() or (partners < -1).any() or (taken[1:] == taken[:-1]).any():
-            raise ValueError(f"partners must be numbers of objects, none twice, or -1, got {given.tolist()}")
+            rule = "partners must be numbers of objects, none twice, or -1"
+            raise ValueError(f"{rule}, got {given.tolist()}")
         told = np.eye(taken.max(initial=-1) + 2)[partners]  # -1 is the last column
         return cls(corner_indices(partners, turn), 0.0, np.inf, True, float(turn), 1.0, told)
 
@@ -178,7 +183,7 @@ class Matching:
         return np.take_along_axis(self.pair_probabilities, self.partners[:, None], axis=1)[:, 0]
 
     def _told(self, a):
-        """What is said of object a, and where that is not sure also how probable that and the rival are."""
+        """What is said of object a; where that is not sure, also how probable that and a rival are."""
         said = _in_words(self.partners[a])
         if self.pair_probabilities is None or self.sure[a]:
             return f"{a} {said}"
@@ -195,7 +200,9 @@ def _in_words(partner):
 
 def _percent(share):
     """A probability that is not rounded up to certainty."""
-    return f"{share:.0%}".replace("%", " %") if share < 0.995 or share == 1 else f"{np.floor(1e3 * share) / 10:.1f} %"
+    if share < 0.995 or share == 1:
+        return f"{100 * share:.0f} %"
+    return f"{np.floor(1e3 * share) / 10:.1f} %"
 
 
 def match(environment_i, environment_j, method="robust", moved=0.4):
@@ -243,9 +250,9 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
         return _match_robustly(environment_i, environment_j, moved)
     counts = f"{len(environment_i)} and {len(environment_j)}"
     if min(len(environment_i), len(environment_j)) < 2:
-        raise ValueError(f"the literal method compares layouts: at least 2 objects in each, got {counts}")
+        raise ValueError(f"the literal method needs at least 2 objects in each, got {counts}")
     if len(environment_i) != len(environment_j):
-        raise ValueError(f"the literal method is a bijection and needs the same number of objects, got {counts}")
+        raise ValueError(f"the literal method needs the same number of objects, got {counts}")
     return _match_literally(environment_i, environment_j)
 
 
@@ -280,7 +287,7 @@ def match_surely(environment_i, environment_j, names):
     >>> before = Environment([[0, 0, 1, 1], [3, 0, 4, 1]])
     >>> match_surely(before, before, ("before", "after"))[0].partners.tolist()
     [0, 1]
-    >>> after = Environment([[0, 0, 1, 1], [0, 3, 1, 4]])
+    >>> after = Environment([[1.5, -1.5, 2.5, -0.5], [1.5, 1.5, 2.5, 2.5]])
     >>> match_surely(before, after, ("before", "after"))  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ValueError: before and after cannot be matched with confidence: ...
@@ -298,7 +305,7 @@ def match_surely(environment_i, environment_j, names):
         advice += " or learn(..., matchings=[...]), or move the objects apart"
         raise ValueError(f"{pair} cannot be matched with confidence: {found}; {rule}; {advice}")
     indices = np.where(np.repeat(matching.sure, 4), matching.indices, -1)
-    text = f"{pair}: it is not sure which object is which of {found}; what is tied to them alone is not moved"
+    text = f"{pair}: not sure which object is which, and left out: {found}"
     return replace(matching, indices=indices), (Note("matching", text, doubt=False),)
 
 
@@ -385,18 +392,27 @@ def _extents(environment):
 def _size_ratios(environment_i, environment_j):
     extents, variances = zip(_extents(environment_i), _extents(environment_j), strict=True)
     new_i, new_j = _as_new(extents, variances)
+    any_i, any_j = map(_any_size, variances)
+    any_size = _MISJUDGED * np.sqrt(any_i[:, None] * any_j)
     ratios = []
     for axes in ([0, 1], [1, 0]):
         same = _normal(extents[0][:, axes], extents[1], variances[0][:, axes], variances[1])
-        ratios.append(np.log(_MEASURED * same + _MISJUDGED * _ANY_SIZE) - (new_i[:, None] + new_j) / 2)
+        ratios.append(np.log(_MEASURED * same + any_size) - (new_i[:, None] + new_j) / 2)
     return np.array(ratios)
 
 
 def _normal(one, other, variances_one, variances_other):
-    """(N, M) density of the difference between sizes (N, 2) and (M, 2), in 1/m^2."""
-    variances = variances_one[:, None] + variances_other
+    """(N, M) density in 1/m^2 of one size (M, 2), if its thing is that of another one (N, 2)."""
+    # What is measured worse than things differ says no more of the other than that they are things.
+    both = [(each + each * _SIZES**2 / (each + _SIZES**2)) / 2 for each in (variances_one, variances_other)]
+    variances = both[0][:, None] + both[1]
     squares = (one[:, None] - other) ** 2 / variances
     return np.exp(-squares.sum(axis=2) / 2) / (2 * pi * np.sqrt(variances.prod(axis=2)))
+
+
+def _any_size(variances):
+    """(N,) density B in 1/m^2 of a size, measured with variances (N, 2), of no thing in particular."""
+    return 1 / (2 * pi * np.sqrt((variances + _SIZES**2).prod(axis=1)))
 
 
 def _as_new(extents, variances):
@@ -405,14 +421,16 @@ def _as_new(extents, variances):
     It is like one of the others beside it, or any; how often which, the two environments tell.
     """
     like = [_like_others(*each) for each in zip(extents, variances, strict=True)]
-    beside = np.concatenate([each if len(each) > 1 else [] for each in like])
-    evidence = np.log(_ALIKE[:, None] * beside + (1 - _ALIKE[:, None]) * _ANY_SIZE).sum(axis=1)
+    other = [_any_size(each) for each in variances]
+    beside = [np.stack(each) for each in zip(like, other, strict=True) if len(each[0]) > 1]
+    like_any = np.concatenate([np.empty((2, 0)), *beside], axis=1)
+    evidence = np.log(_ALIKE[:, None] * like_any[0] + (1 - _ALIKE[:, None]) * like_any[1]).sum(axis=1)
     alike = np.average(_ALIKE, weights=np.exp(evidence - evidence.max()))
     across = _normal(*extents, *variances)
     for k, each in enumerate(like):
         if len(each) == 1:  # there are no others beside it
             like[k] = across.mean(axis=1 - k)
-    return [np.log(alike * each + (1 - alike) * _ANY_SIZE) for each in like]
+    return [np.log(alike * each + (1 - alike) * any_size) for each, any_size in zip(like, other, strict=True)]
 
 
 def _like_others(extents, variances):
@@ -420,14 +438,14 @@ def _like_others(extents, variances):
     return (same.sum(axis=1) - np.diag(same)) / max(len(extents) - 1, 1)
 
 
-def _count_weights(n, m, unseen_i=True, unseen_j=True):
-    """(K + 1,) log w_k for k = 0 ... K = min(N, M) pairs, as the module has it, but for a constant."""
+def _count_weights(n, m, unseen_i=True, unseen_j=True, p=_VISIBLE):
+    """(K + 1,) log w_k for k = 0 ... K = min(N, M) pairs, with the mean over p where it is unknown."""
     k = np.arange(min(n, m) + 1)
-    p = _VISIBLE[:, None]
-    left_out = (n - k) * unseen_j + (m - k) * unseen_i
-    chances = left_out * np.log(1 - p) + k * (unseen_i + unseen_j) / 2 * np.log(p)
+    p = p[:, None]
+    chances = ((n - k) * unseen_j + (m - k) * unseen_i) * np.log(1 - p)
+    chances = chances + (n * unseen_i + m * unseen_j) * np.log(p)
     if unseen_i and unseen_j:
-        chances = chances - (n + m - k) * np.log(2 - p)
+        chances = chances - (n + m - k) * np.log(p * (2 - p))  # to be seen at all
     return scipy.special.gammaln(n + m - k) + np.logaddexp.reduce(chances, axis=0) - np.log(len(p))
 
 
@@ -448,38 +466,35 @@ class _Cases:
 
 
 def _cases(scene, turns, shifts, priors, free):
-    """The layouts (H,), each with small and large moves, few and many objects carried off; or put up anew."""
+    """The layouts (H,), each with small and large moves, few and many carried off; or put up anew."""
     n, m = len(scene.x), len(scene.y)
-    images, origins = (
-        turns[:, None] * scene.x + shifts[:, None],
-        (scene.y - shifts[:, None]) / turns[:, None],
-    )
+    images = turns[:, None] * scene.x + shifts[:, None]
+    origins = (scene.y - shifts[:, None]) / turns[:, None]
     i, j = scene.environments
     lost_i, over_i = _found(i, j, images * scene.moved, scene.moved)
     lost_j, over_j = _found(j, i, origins * scene.moved, scene.moved)
-    counts = (priors + lost_i + lost_j)[:, None] + _count_weights(n, m, i.seen is None, j.seen is None)
-    others = scene.sizes[_quarters(turns)] + over_i[:, :, None] + over_j[:, None]
+    counts = _count_weights(n, m, i.seen is None, j.seen is None)
+    counts = counts + (priors + lost_i + lost_j)[:, None]
+    others, sizes = over_i[:, :, None] + over_j[:, None], scene.sizes[_quarters(turns)]
+    told = [(sizes, np.log(1 - _UNTOLD)), (0.0, np.log(_UNTOLD))]
     squares = np.abs(scene.y - images[:, :, None]) ** 2
-    near = {spread: _normal_at(squares, scene.blur + spread**2) * scene.area for spread in (0.0, *_SPREADS)}
+    variances = {spread: scene.blur + spread**2 for spread in (0.0, *_SPREADS)}
+    near = {spread: _normal_at(squares, each) * scene.area for spread, each in variances.items()}
     ratios, known = [], []
-    for spread, still in product(_SPREADS, _STILL):
+    for spread, still, carried in product(_SPREADS, _STILL, _CARRIED):
         shifted = (1 - still) * near[spread] + still * near[0.0]
-        ratios.extend(np.log((1 - carried) * shifted + carried) + others for carried in _CARRIED)
+        ratio = np.log((1 - carried) * shifted + carried) + others
         # The less was moved, the better shift and turn are known.
         room = free * np.log(np.sqrt(scene.blur.min()) if still else spread)
         # Untouched though turned about its own middle: no frame of reference does that to a layout.
-        known.extend([np.where(still * (free == 1), -_NEVER, room)] * len(_CARRIED))
-    # Where things were put up anew, nobody knows how much of that was seen.
-    return _Cases(
-        np.append(1, np.tile(turns, len(known))),
-        np.vstack(
-            [
-                _count_weights(n, m) - _ANEW,
-                *(counts + each[:, None] - np.log(len(known)) for each in known),
-            ]
-        ),
-        np.concatenate([scene.sizes[:1], *ratios]),
-    )
+        room = np.where(still * (free == 1), -_NEVER, room)
+        for size, prior in told:
+            ratios.append(ratio + size)
+            known.append(room + prior)
+    # Of what was put up anew nobody knows how many are still the same, nor whether all were seen.
+    anew, turns = _count_weights(n, m, p=_ANY) - _ANEW, np.append(1, np.tile(turns, len(known)))
+    counts = np.vstack([anew, *(counts + each[:, None] - np.log(len(known) / len(told)) for each in known)])
+    return _Cases(turns, counts, np.concatenate([scene.sizes[:1], *ratios]))
 
 
 def _normal_at(squares, variances):
@@ -487,9 +502,9 @@ def _normal_at(squares, variances):
 
 
 def _found(environment, other, places, moved):
-    """Of objects that would stand at places (H, N) in the other one, in m, if what was seen is known there:
+    """If objects stood at places (H, N) in the other one, in m: would they be found?
 
-    log q of all together (H,), and log sqrt(1 - q) / q of each (H, N).
+    log q of all together (H,), and log sqrt(1 - q) / q of each (H, N); 0 where that is unknown.
     """
     if other.seen is None:
         return np.zeros(len(places)), np.zeros(places.shape)
@@ -511,7 +526,7 @@ def _found(environment, other, places, moved):
 
 
 def _alignments(scene):
-    """In place, and what fits best of all layouts that were moved as a whole: x at turns * x + shifts.
+    """In place, and what fits best of all that were moved as a whole: x at turns * x + shifts.
 
     Turns, shifts, complex, their logarithmic priors with the room that they are uncertain by, and
     how many of their numbers are free, each (H,).
@@ -533,7 +548,7 @@ def _alignments(scene):
 
 
 def _starts(scene):
-    """Turns and shifts (H,) that bring most objects near others, pivots, and whether they may turn."""
+    """Turns and shifts (H,) that bring objects near others, pivots, and whether they may turn."""
     circle = np.exp(1j * np.arange(8) * pi / 4)
     shifted, turned = _fitting(scene, circle[:1]), _fitting(scene, circle)
     free = np.full(len(shifted[0]) + len(turned[0]), np.nan)
@@ -583,8 +598,8 @@ def _refined(scene, turns, shifts, pivots, turning):
         -_TURNED - turn_room,
         np.where(fixed, -np.log(2), -_SHIFTED - shift_room),
     )  # of two pivots
-    kept = _distinct(turns[:, None] * x + shifts[:, None], turning + 2 * fixed * (1 + (pivots == pivots[-1])))
     free = turning + 2.0 * ~fixed
+    kept = _distinct(turns[:, None] * x + shifts[:, None], free + 4 * (pivots == pivots[-1]))
     return (
         turns[kept],
         shifts[kept],
@@ -594,7 +609,7 @@ def _refined(scene, turns, shifts, pivots, turning):
 
 
 def _near(scene, chosen, turns, shifts):
-    """(H, n, M) what it is worth that chosen objects are the same as others, near which they lie."""
+    """(H, n, M) what it is worth that chosen objects are those near which they lie."""
     images = turns[:, None] * scene.x[chosen] + shifts[:, None]
     squares = np.abs(scene.y - images[:, :, None]) ** 2
     return np.exp(scene.sizes[:, chosen][_quarters(turns)] - squares / 2) * scene.area / (2 * pi)
@@ -627,9 +642,10 @@ def _distinct(images, families):
 def _that_count(cases):
     """Those alone that may hold a share of the probability worth telling."""
     step = np.diff(cases.counts[:, [0, -1]])[:, :, None] / (cases.counts.shape[1] - 1)
-    pairs = np.exp(cases.ratios + step)
+    every = 1 + cases.ratios.shape[1] // (2 * _PROBES)  # of a crowd some speak for the others
+    pairs = np.exp(cases.ratios[:, ::every] + step)
     bounds = [np.log1p(pairs.sum(axis=axis)).sum(axis=1) for axis in (1, 2)]
-    bound = cases.counts[:, 0] + np.minimum(*bounds)
+    bound = cases.counts[:, 0] + every * np.minimum(*bounds)
     return cases[bound > bound.max() - _NEGLIGIBLE]
 
 
@@ -637,7 +653,7 @@ def _that_count(cases):
 
 
 def _summed(cases):
-    """Logarithmic sum (H,) over all partial matchings, and the share (H, N, M) of it that has each pair.
+    """Logarithmic sum (H,) over all partial matchings, and the share (H, N, M) with each pair.
 
     Row by row, over the sets of columns that are taken; a set is a number, a bit for each column.
     """
@@ -660,7 +676,8 @@ def _summed(cases):
         later = after.copy()
         for column in range(m):
             taken = _by_column(later, column)[1] * pairs[row, column]
-            marginals[row, column] = np.einsum("abh,abh->h", _by_column(before[row], column)[0], taken)
+            free = _by_column(before[row], column)[0]
+            marginals[row, column] = np.einsum("abh,abh->h", free, taken)
             after_free = _by_column(after, column)[0]
             after_free += taken
     return np.log(after[0]) + scale, np.moveaxis(marginals / after[0], 2, 0)
@@ -702,7 +719,7 @@ def _best(cases, pairs):
 
 
 def _neighbours(partners, m):
-    """All matchings (P, N) in which one object has no partner or a free one, or two have changed theirs."""
+    """Matchings (P, N) with another partner or none for one object, or two that changed theirs."""
     n, free = len(partners), np.setdiff1d(np.arange(m), partners)
     others = []
     for a, b in product(range(n), [-1, *free]):
@@ -772,7 +789,8 @@ def _at_least(weights, marginals):
     Taken for independent they underrate what hangs together: so it is not sure too easily.
     """
     partners = _assigned(weights, 0.0)
-    said = np.column_stack([marginals, 1 - marginals.sum(axis=1)])[np.arange(len(partners)), partners]
+    told = np.column_stack([marginals, 1 - marginals.sum(axis=1)])
+    said = told[np.arange(len(partners)), partners]
     used = partners >= 0
     return weights[used, partners[used]].sum() - np.log(np.maximum(said, 1e-12)).sum()
 

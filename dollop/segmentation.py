@@ -8,16 +8,29 @@ tolerance are reconstructions.
 Symbols: C candidate cuts, d = 2 dimensions, K trajectories; G0 and G1 as in `dollop.lds`.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
-from dollop.lds import DECAY, NOTHING, STEPS, Statistics, dot, powers_on
+from dollop.lds import DECAY, NOTHING, STEPS, Statistics
 from dollop.trajectory import remaining_share
 
-__all__ = ["HORIZON", "best_segments", "fewest_segments", "raw_statistics", "retimed_statistics", "segment_errors"]
+__all__ = [
+    "HORIZON",
+    "best_segments",
+    "fewest_cuts",
+    "fewest_segments",
+    "raw_statistics",
+    "retimed_statistics",
+    "segment_errors",
+]
 
 HORIZON, SETTLED = 48, 4.0
 """The search follows a response over this many points, over this many time constants."""
 
+AT_ONCE = 320  # segments looked at together: what is held of them stays in a processor's cache
+FIRST_LOOK = 4  # cuts within a segment
+ROUNDING = 1e-9  # share of a sum that its order may change
 EVEN = 1e-8  # m per squared cut: of equal errors the more even division, not as rounding has it
 
 
@@ -32,9 +45,7 @@ def retimed_statistics(aligned):
     Returns
     -------
     callable
-        (start, length) -> Statistics (..., d, d). Start (...) and length count cuts; all segments
-        of one call have one length, because then they also share the places at which they are
-        sampled.
+        (start, length) -> Statistics (..., d, d). Start and length (...) count cuts.
 
     Examples
     --------
@@ -48,15 +59,45 @@ def retimed_statistics(aligned):
     (True, True)
     """
 
+    columns = np.ascontiguousarray(aligned.transpose(0, 2, 1))
+    steps = np.diff(columns, axis=2)
+    low, share = retimed_places(aligned.shape[1] // 2 + 1)
+
     def statistics(start, length):
-        at = 2 * length * (1 - remaining_share(STEPS, DECAY))
-        low = np.minimum(at.astype(int), 2 * length - 1)
-        rows = 2 * np.asarray(start)[..., None] + low
-        before, after = aligned.take(rows, axis=1), aligned.take(rows + 1, axis=1)
-        each = Statistics.of(before + (at - low)[:, None] * (after - before))
-        return Statistics(each.G0.sum(axis=0), each.G1.sum(axis=0))
+        rows = low.take(length, axis=0) + 2 * np.asarray(start)[..., None]
+        between = share.take(length, axis=0)
+        samples = (along_edges(*each, rows, between) for each in zip(columns, steps, strict=True))
+        first, *others = map(componentwise_statistics, samples)
+        return sum(others, first)
 
     return statistics
+
+
+def along_edges(starts, edges, which, share):
+    """Places (d, ...) a share of the way along those edges (d, N) that are named."""
+    places = edges.take(which, axis=1)
+    places *= share
+    places += starts.take(which, axis=1)
+    return places
+
+
+@lru_cache(maxsize=4)
+def retimed_places(count):
+    """Where segments of length 0 to count - 1 are sampled: the samples before, the shares to the next.
+
+    Two (count, STEPS + 1) arrays.
+    """
+    length = np.arange(count)[:, None]
+    at = 2 * length * (1 - remaining_share(STEPS, DECAY))
+    low = np.clip(at.astype(int), 0, np.maximum(2 * length - 1, 0))
+    return low, at - low
+
+
+def componentwise_statistics(samples):
+    """`Statistics.of` samples (d, ..., N), one component after the other: faster."""
+    offsets = samples - samples[..., -1:]
+    before, after = offsets[..., :-1], offsets[..., 1:]
+    return Statistics(*(np.einsum("a...n,b...n->...ab", each, before) for each in (before, after)))
 
 
 def raw_statistics(walks, moments):
@@ -125,7 +166,7 @@ def segment_errors(path, statistics):
 
     Parameters
     ----------
-    path : (C, d) float array
+    path : (C, 2) float array
         The walks' mean at the candidate cuts, m.
     statistics : callable
         (start, length) -> Statistics.
@@ -146,55 +187,176 @@ def segment_errors(path, statistics):
     True
     """
     errors = np.full((len(path), len(path)), np.inf)
-    for length in range(2, len(path)):
-        start = np.arange(len(path) - length)
-        windows = path[start[:, None] + np.arange(length + 1)]
-        offsets = windows - windows[:, -1:]
-        responses = candidate_responses(statistics(start, length), offsets[:, 0])
-        errors[start, start + length] = distances(offsets[:, 1:-1], responses).sum(axis=1)
+    cuts = np.arange(len(path))
+    fill_errors(errors, path, statistics, cuts, cuts, np.inf)
     return errors
 
 
+def fewest_cuts(path, statistics, tolerance):
+    """`fewest_segments` of all `segment_errors`, found by looking only at those that can matter.
+
+    Parameters
+    ----------
+    path : (C, 2) float array
+        The walks' mean at the candidate cuts, m.
+    statistics : callable
+        (start, length) -> Statistics.
+    tolerance : float
+        Largest mean error of a segment, m.
+
+    Returns
+    -------
+    (S + 1,) int array
+        The cuts of S segments, the first 0 and the last C - 1.
+
+    Raises
+    ------
+    ValueError
+        No division keeps the tolerance; the message says which it could keep.
+
+    Examples
+    --------
+    A corner is cut where it is:
+
+    >>> corner = np.array([[min(k, 8), max(k - 8, 0)] for k in range(17)], float)
+    >>> fewest_cuts(corner[::2], retimed_statistics(corner[None]), 0.01)
+    array([0, 4, 8])
+    """
+    cuts = divide(errors_within(path, statistics, tolerance), lambda total, k: np.isfinite(total))
+    return fewest_segments(segment_errors(path, statistics), tolerance) if cuts is None else cuts
+
+
+def errors_within(path, statistics, tolerance):
+    """The `segment_errors` (C, C) that a division into the fewest segments can need, `inf` elsewhere.
+
+    Such a division goes from every cut to one that no fewer segments reach: so first come the cuts
+    that one segment within the tolerance reaches, then those that a second reaches from there.
+    """
+    errors = np.full((len(path), len(path)), np.inf)
+    cuts = np.arange(len(path))
+    fresh, missed = cuts[:1], cuts[1:]
+    while len(fresh) and cuts[-1] in missed:
+        fill_errors(errors, path, statistics, fresh, missed, tolerance)
+        hit = np.isfinite(errors[np.ix_(fresh, missed)]).any(axis=0)
+        fresh, missed = missed[hit], missed[~hit]
+    return errors
+
+
+def fill_errors(errors, path, statistics, starts, ends, tolerance):
+    """Enter the errors in m of segments from any of `starts` to any of `ends`, where within tolerance."""
+    length = ends - starts[:, None]
+    rows, columns = np.nonzero(length >= 2)
+    order = np.argsort(length[rows, columns], kind="stable")
+    start, end = starts[rows[order]], ends[columns[order]]
+    for k in range(0, len(order), AT_ONCE):
+        some = start[k : k + AT_ONCE], end[k : k + AT_ONCE]
+        errors[some] = errors_of_some(path, statistics, *some, tolerance)
+
+
+def errors_of_some(path, statistics, start, end, tolerance):
+    """Errors (B,) in m of segments from start to end (B,), `inf` where their mean exceeds the tolerance.
+
+    Few cuts all over a segment are looked at first, then as many again, and so on; but no more
+    once their distances add up to more than the whole segment is allowed.
+    """
+    length, columns = end - start, np.ascontiguousarray(path.T)
+    goals = columns.take(end, axis=1)
+    polylines = candidate_responses(statistics(start, length), columns.take(start, axis=1) - goals)
+    vertices, order = lifted_vertices(polylines), spread_order(len(path))
+    total, left, seen, enough = np.zeros(len(start)), np.arange(len(start)), 0, FIRST_LOOK
+    while len(left):
+        cuts = start[left, None] + order[length[left], seen : min(enough, length[left].max() - 1)]
+        points = columns.take(cuts, axis=1) - goals[:, left, None]
+        total[left] += distances(points, polylines, vertices, left).sum(axis=1)
+        hopeful = total[left] <= (1 + ROUNDING) * tolerance * length[left]
+        left = left[hopeful & (length[left] - 1 > enough)]
+        seen, enough = enough, 2 * enough
+    return np.where(total / length <= tolerance, total, np.inf)
+
+
+@lru_cache(maxsize=4)
+def spread_order(count):
+    """(count, count) ints: row L holds 1 to L - 1, the first few of them all over, then only L.
+
+    L is the end of a segment of that length, which lies on every response.
+    """
+    bits = int(count - 1).bit_length()
+    reversed_bits = sum((np.arange(2**bits) >> k & 1) << (bits - 1 - k) for k in range(bits))
+    order = np.tile(np.arange(count)[:, None], (1, count))
+    for length in range(2, count):
+        order[length, : length - 1] = reversed_bits[(reversed_bits > 0) & (reversed_bits < length)]
+    return order
+
+
 def candidate_responses(statistics, x0):
-    """Responses (B, HORIZON + 2, d) from offsets x0 (B, d), up to the subgoal at 0.
+    """Responses (2, HORIZON + 2, B) from offsets x0 (2, B), up to the subgoal at 0.
 
     Slow systems are shown by every m-th state, m a power of two such that the response settles
     within the horizon.
     """
     time_constants = -1 / np.log(np.clip(statistics.decay, 0.5, 1 - 1e-6))  # in steps
     doublings = np.log2(np.maximum(SETTLED * time_constants / HORIZON, 1)).astype(int)
-    step = statistics.matrix
+    step = componentwise_matrix(statistics)
     for k in range(doublings.max()):
-        step = np.where((k < doublings)[:, None, None], step @ step, step)
-    states = powers_on(step, x0, HORIZON)
-    return np.concatenate([states, np.zeros_like(states[:, :1])], axis=1)
+        step = np.where(k < doublings, product(step, step), step)
+    states, known = np.zeros((2, HORIZON + 2, x0.shape[1])), 1
+    states[:, 0] = x0
+    while known <= HORIZON:
+        more = min(known, HORIZON + 1 - known)
+        states[:, known : known + more] = product(step, states[:, :more])
+        step, known = product(step, step), known + more
+    return states
 
 
-def distances(points, polylines):
-    """Distances (B, T) of points (B, T, d) to polylines (B, V, d), beside their nearest vertices.
+def componentwise_matrix(statistics):
+    """`Statistics.matrix` A = G1 G0^-1 as (2, 2, B), by the formula for two dimensions: faster."""
+    G0, G1 = (np.ascontiguousarray(each.transpose(1, 2, 0)) for each in statistics.regular)
+    adjugate = np.array([[G0[1, 1], -G0[0, 1]], [-G0[1, 0], G0[0, 0]]])
+    return product(G1, adjugate) / (G0[0, 0] * G0[1, 1] - G0[0, 1] * G0[1, 0])
+
+
+def product(A, B):
+    """A B of matrices (2, 2, ...) and (2, m, ...), components first."""
+    AB = A[:, :1] * B[:1]
+    AB += A[:, 1:] * B[1:]
+    return AB
+
+
+def lifted_vertices(polylines):
+    """-2 v and |v|^2 of the vertices v of polylines (2, V, B), as (B, 3, V): for `nearest_vertices`."""
+    v = polylines.transpose(2, 0, 1).astype(np.float32, order="C")
+    return np.concatenate([-2 * v, v[:, :1] * v[:, :1] + v[:, 1:] * v[:, 1:]], axis=1)
+
+
+def nearest_vertices(points, lifted):
+    """Which vertex (Q, T) of (Q, 3, V) is nearest to points p (2, Q, T): least |v|^2 - 2 v p."""
+    ones = np.ones((*points.shape[1:], 3), np.float32)  # single precision: only to choose
+    ones[..., 0], ones[..., 1] = points
+    return (ones @ lifted).argmin(axis=2)
+
+
+def distances(points, polylines, lifted, which):
+    """Distances (Q, T) of points (2, Q, T) to the polylines numbered `which` (Q,) of (2, V, B).
 
     Only the two edges at the nearest vertex are looked at: that is what makes the search fast.
     Where a polyline comes closest between two vertices that are both farther away than a third one,
     the distance is slightly too large, never too small.
     """
-    count, d = polylines.shape[1:]
-    vertices = polylines.astype(np.float32)  # only to choose the nearest: |v|^2 - 2 v p
-    weights = np.concatenate([-2 * vertices, dot(vertices, vertices)[..., None]], axis=2)
-    lifted = np.ones((*points.shape[:2], d + 1), np.float32)
-    lifted[..., :d] = points
-    closest = (lifted @ np.ascontiguousarray(np.swapaxes(weights, 1, 2))).argmin(axis=2)
-    flat, row = polylines.reshape(-1, d), count * np.arange(len(points))[:, None]
-    tails = row + np.maximum(closest - 1, 0), row + np.minimum(closest, count - 2)
-    edges = (flat.take([tail, tail + 1], axis=0) for tail in tails)
-    return np.minimum(*(distance_to_edge(points, *ends) for ends in edges))
+    count, many = polylines.shape[1:]
+    vertex = nearest_vertices(points, lifted if len(which) == many else lifted[which])
+    flat, at = polylines.reshape(2, -1), vertex * many + which[:, None]
+    near = flat.take(at, axis=1)
+    others = np.where(vertex > 0, -many, 0), np.where(vertex < count - 1, many, 0)
+    edges = (flat.take(at + other, axis=1) - near for other in others)
+    return np.sqrt(np.minimum(*(squared_distance(points - near, edge) for edge in edges)))
 
 
-def distance_to_edge(points, tail, head):
-    """Distance (...) of points to the edges from tail to head, all (..., d)."""
-    offset, along = points - tail, head - tail
-    share = np.clip(dot(offset, along) / np.maximum(dot(along, along), NOTHING), 0, 1)
-    offset -= share[..., None] * along
-    return np.sqrt(dot(offset, offset))
+def squared_distance(offset, along):
+    """Squared distance (...) of offsets (2, ...) from a place to the edge along (2, ...) from there."""
+    (x, y), (u, v) = offset, along
+    share = np.clip((x * u + y * v) / np.maximum(u * u + v * v, NOTHING), 0, 1)
+    x, y = x - share * u, y - share * v
+    return x * x + y * y
 
 
 def fewest_segments(errors, tolerance):

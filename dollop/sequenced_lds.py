@@ -1,6 +1,7 @@
 """The user's trajectory as a sequence of linear dynamical systems, the control law (Sec. III)."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from dollop.law.timing import CORNER, Stands, shown_pauses, shown_profile, times
 from dollop.lds import LDS
 from dollop.segmentation import (
     best_segments,
+    fewest_cuts,
     fewest_segments,
     raw_statistics,
     retimed_statistics,
@@ -18,6 +20,7 @@ from dollop.segmentation import (
 from dollop.trajectory import (
     align,
     arc_length,
+    check_one_way,
     check_trajectories,
     check_trajectory,
     distance_to_polyline,
@@ -96,7 +99,7 @@ class SequencedLDS:
         Parameters
         ----------
         trajectories : (N, 2) array_like or sequence of (N_k, 2) array_like
-            Positions in m; several must start and end at corresponding places.
+            Positions in m; several must be walks of one way (`dollop.trajectory.ways_apart`).
         tolerance : float
             Largest mean error of a segment in m.
         n_segments : int, optional
@@ -117,8 +120,8 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            Trajectories as in `LDS.fit`, a parameter out of its range, or a tolerance that no
-            division keeps.
+            Trajectories as in `LDS.fit`, walks that are not of one way, a parameter out of its
+            range, or a tolerance that no division keeps.
 
         Examples
         --------
@@ -131,17 +134,18 @@ class SequencedLDS:
         stands = [Stands.of(walk, sample_period) for walk in check_trajectories(trajectories)]
         walks = [each.walk for each in stands]
         aligned, shares = align(walks, 2 * candidates - 1)
+        check_one_way(walks, aligned)
         path, moments = aligned.mean(axis=0)[::2], cut_moments(walks, shares[:, ::2])
         statistics = retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
-        errors = segment_errors(path, statistics)
         pauses = shown_pauses(stands, shares[:, ::2], arc_length(path)[-1])
-        division = Division(path, statistics, errors, pauses)
+        division = Division(path, statistics, pauses)
         cuts = division.exactly(n_segments) if n_segments is not None else division.within(tolerance)
         at = moments[:, cuts]
         law = cls(division.segments(cuts), path[0], demonstrated_speeds(walks, at, sample_period))
-        return law.with_timing(walks, at, sample_period, *division.stops(cuts))
+        lengths = [line.way[-1] for line in division.lines(cuts)]
+        return law.with_timing(walks, at, sample_period, *division.stops(cuts), lengths)
 
-    def with_timing(self, walks, moments, sample_period, pauses, corners):
+    def with_timing(self, walks, moments, sample_period, pauses, corners, lengths):
         """The same law with the timing and the corners of what it was fitted to.
 
         Parameters
@@ -156,14 +160,15 @@ class SequencedLDS:
             s.
         corners : (K,) bool array
             Whether one was shown.
+        lengths : (K,) sequence of float
+            Of the segments' lines, m.
 
         Returns
         -------
         SequencedLDS
         """
-        law = replace(self, pauses=pauses, corners=corners)
-        lengths = np.array([line.way[-1] for line in law.lines()])
-        return replace(law, profile=shown_profile(walks, moments, lengths, sample_period))
+        profile = shown_profile(walks, moments, np.array(lengths), sample_period)
+        return replace(self, pauses=pauses, corners=corners, profile=profile)
 
     def lines(self, reach=0.01):
         """What each segment keeps to: the response of its LDS from the subgoal before.
@@ -455,16 +460,18 @@ class Division:
         The walks' mean at the candidate cuts, m.
     statistics : callable
         (start, length) -> Statistics.
-    errors : (C, C) float array
-        From `segment_errors`, m.
     pauses : dict of int to float
         Seconds stood, by candidate cut.
     """
 
     path: np.ndarray
     statistics: object
-    errors: np.ndarray
     pauses: dict
+
+    @cached_property
+    def errors(self):
+        """(C, C) float array from `segment_errors`, m."""
+        return segment_errors(self.path, self.statistics)
 
     def within(self, tolerance):
         """Cuts (S + 1,) of the fewest segments within a tolerance in m, as they are and rounded.
@@ -474,6 +481,10 @@ class Division:
         than the path; with them those like them. Then the walk is divided anew. Where that never
         ends, the division with the least excess is taken.
         """
+        if not self.pauses:
+            cuts = fewest_cuts(self.path, self.statistics, tolerance)
+            if self.excess(cuts, tolerance).max() <= 1:
+                return cuts
         errors, tried = self._cut(self.errors, list(self.pauses)), []
         while len(tried) < ROUNDS:
             try:
@@ -517,6 +528,19 @@ class Division:
         spans = zip(cuts[:-1], np.diff(cuts), self.path[cuts[1:]], strict=True)
         return tuple(LDS(self.statistics(start, length), goal) for start, length, goal in spans)
 
+    def lines(self, cuts):
+        """The line of each segment (`SequencedLDS.lines`), for cuts (S + 1,)."""
+        key = cuts.tobytes()
+        if key not in self._lines:
+            corners = self.stops(cuts)[1]
+            self._lines[key] = lines_of(self.segments(cuts), self.path[0], corners, REACH)
+        return self._lines[key]
+
+    @cached_property
+    def _lines(self):
+        """The lines of divisions that were looked at."""
+        return {}
+
     def stops(self, cuts):
         """Seconds stood at each cut (S + 1,), and whether there is a corner or a stop at each end (S,)."""
         seconds = np.zeros(len(cuts))
@@ -534,8 +558,7 @@ class Division:
         In units of the tolerance in m and of 10 degrees, the larger of both. While the mean over
         the whole path is within the tolerance, no segment is beside it too far.
         """
-        corners = self.stops(cuts)[1]
-        lines = lines_of(self.segments(cuts), self.path[0], corners, REACH)
+        corners, lines = self.stops(cuts)[1], self.lines(cuts)
         spans = zip(cuts[:-1], cuts[1:], lines, strict=True)
         beside = [distance_to_polyline(self.path[i + 1 : j], line.places) for i, j, line in spans]
         total = np.concatenate(beside).mean() / tolerance

@@ -5,9 +5,15 @@ plane.
 """
 
 import numpy as np
+import scipy
 
 from dollop.checks import checked_positions
 
+_AT_ONCE = 1 << 14  # pairs of a point and an edge measured at once: they stay in a processor's cache
+_FAR, _NEAR = 0.2, 0.15  # of the walks' size: farther is another way, nearer is not (letters of one kind: 0.14)
+_STRAY = 1.0  # m, twice as far as walked subgoals scatter: another way, if the others keep together
+_TOGETHER = 3.0  # others keep together if this many times as close (sets of one way: 2.8 in 600)
+_NAMED = 5  # more walks are counted, not named
 _ROUNDS = 3  # how often walks are laid onto their mean: then it hardly changes any more
 
 
@@ -229,11 +235,33 @@ def distance_to_polyline(points, polyline):
     """
     points, polyline = np.asarray(points, float), np.asarray(polyline, float)
     edges = np.diff(polyline, axis=0) if len(polyline) > 1 else np.zeros_like(polyline)
-    starts = polyline[: len(edges)]
+    return _distance_to_edges(points, polyline[: len(edges)], edges)
+
+
+def _distance_to_edges(points, starts, edges):
+    """Distances (N,) in m of points (N, d) to the nearest of edges, starts (M, d) and along (M, d).
+
+    Many are divided: the points on either side, each with those edges that can be nearest to one of
+    them, which is judged by the distance to the middle of a circle round them.
+    """
+    if len(points) == 1 or len(points) * len(edges) <= _AT_ONCE:
+        return _to_each_edge(points, starts, edges).min(axis=1)
+    nearest, widest = np.empty(len(points)), np.ptp(points, axis=0).argmax()
+    for some in np.array_split(np.argpartition(points[:, widest], len(points) // 2), 2):
+        middle = (points[some].min(axis=0) + points[some].max(axis=0)) / 2
+        radius = np.linalg.norm(points[some] - middle, axis=1).max()
+        apart = _to_each_edge(middle[None], starts, edges)[0]
+        near = ~(apart > (1 + 1e-9) * (apart.min() + 2 * radius))
+        nearest[some] = _distance_to_edges(points[some], starts[near], edges[near])
+    return nearest
+
+
+def _to_each_edge(points, starts, edges):
+    """Distances (N, M) in m of points (N, d) to edges, see `_distance_to_edges`."""
     squared = np.maximum((edges**2).sum(axis=1), np.finfo(float).tiny)
     offsets = points[:, None] - starts
     along = np.clip((offsets * edges).sum(axis=2) / squared, 0, 1)
-    return np.sqrt(((offsets - along[..., None] * edges) ** 2).sum(axis=2).min(axis=1))
+    return np.sqrt(((offsets - along[..., None] * edges) ** 2).sum(axis=2))
 
 
 def align(trajectories, n=200):
@@ -308,7 +336,7 @@ def _monotone_warp(reference, walks):
     penalty = (step[:, None] * (np.arange(5) - 2)) ** 2  # five moves: 0 to 4 fine steps
     best = np.full((len(walks), fine + 4), np.inf)
     best[:, 4] = 0.0
-    moves = np.empty((n, len(walks), fine), int)
+    moves = np.empty((n, len(walks), fine), np.int8)
     for i in range(1, n):
         reach = np.stack([best[:, 4 - m :][:, :fine] + penalty[:, m, None] for m in range(5)])
         moves[i] = reach.argmin(axis=0)
@@ -317,6 +345,148 @@ def _monotone_warp(reference, walks):
     for i in range(n - 1, 0, -1):
         at[:, i - 1] = at[:, i] - moves[i, np.arange(len(walks)), at[:, i]]
     return at / (fine - 1)
+
+
+def chained(apart, size, least=0.0):
+    """Which of several walks belong together: each keeps close to the next of its way, all along.
+
+    Beyond the paper. Close is within a fifth of the walks' size, which mirrored, reversed and
+    truncated walks, other shapes and most detours are not. Where three or more are there to compare,
+    a gap above 0.15 of the size, or above 1 m, is too wide as well if it is three times the one
+    that half of the walks keep. Two walks that differ by less than a fifth of their size cannot be
+    told from one that sways.
+
+    Parameters
+    ----------
+    apart : (K, K) float array
+        The largest distance between any two walks at corresponding places, m.
+    size : float
+        Of the walks, m: the diagonal of the box round one.
+    least : float
+        What is close in any case, m.
+
+    Returns
+    -------
+    way : (K,) int array
+        The number of each walk's way; 0 has the most walks, and among equals the first.
+    allowed : float
+        How far from the next walk is still close, m.
+
+    Examples
+    --------
+    Two walks 0.5 m apart can be one way, but not if others keep to 10 cm:
+
+    >>> at = np.array([0.0, 0.5, 0.6, 0.7])
+    >>> apart = abs(at[:, None] - at)
+    >>> chained(apart[:2, :2], 3.0)[0], chained(apart, 3.0)[0]
+    (array([0, 0]), array([1, 0, 0, 0]))
+    """
+    linked = np.maximum(apart, np.finfo(float).tiny)  # 0 would be no link
+    gaps = np.sort(scipy.sparse.csgraph.minimum_spanning_tree(linked).data)
+    usual = gaps[(len(gaps) - 1) // 2] if len(gaps) else 0.0
+    allowed = max(least, min(_FAR * size, max(min(_NEAR * size, _STRAY), _TOGETHER * usual)))
+    _, label = scipy.sparse.csgraph.connected_components(linked <= allowed, directed=False)
+    order = np.argsort(-np.bincount(label), kind="stable")
+    return np.argsort(order)[label], allowed
+
+
+def ways_apart(trajectories, n=50):
+    """Walks sorted by the way they take, any two laid onto each other and compared (see `chained`).
+
+    Parameters
+    ----------
+    trajectories : (N, 2) array_like or sequence of K (N_k, 2) array_like
+        Positions in m.
+    n : int
+        Number of samples to compare.
+
+    Returns
+    -------
+    way : (K,) int array
+        As of `chained`.
+    allowed : float
+        How far from the next walk of its way a walk may be, m.
+    apart : (K, K) float array
+        The largest distance between two walks at corresponding places, m.
+
+    Raises
+    ------
+    ValueError
+        What `check_trajectories` refuses.
+
+    Examples
+    --------
+    >>> walk = np.linspace([0.0, 0.0], [4.0, 0.0], 9)
+    >>> ways_apart([walk[::-1], walk, walk + 0.1])[0]
+    array([1, 0, 0])
+    """
+    walks = check_trajectories(trajectories)
+    fine = np.stack([resample(walk, 2 * n - 1) for walk in walks])
+    apart = np.empty((len(walks), len(walks)))
+    for k, walk in enumerate(fine):
+        at = np.rint(_monotone_warp(walk[::2], fine) * (2 * n - 2)).astype(int)
+        laid = np.take_along_axis(fine, at[..., None], axis=1)
+        apart[k] = np.linalg.norm(laid - walk[::2], axis=2).max(axis=1)
+    apart = np.minimum(apart, apart.T)
+    return *chained(apart, _size(fine), _step(fine[:, ::2])), apart
+
+
+def check_one_way(trajectories, aligned):
+    """Raise an error if several walks are not walks of one way.
+
+    Parameters
+    ----------
+    trajectories : sequence of K (N_k, 2) float arrays
+        m.
+    aligned : (K, n, 2) float array
+        The same as of `align`, m: where these belong together, no two are compared anew.
+
+    Raises
+    ------
+    ValueError
+        The message names the walks of the rarer ways, how far they are from the nearest other walk,
+        what is allowed and what to do.
+
+    Examples
+    --------
+    >>> walk = np.linspace([0.0, 0.0], [4.0, 0.0], 9)
+    >>> walks = [walk, walk[::-1], walk + 0.1]
+    >>> check_one_way(walks, align(walks)[0])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ValueError: trajectories must be walks of one way, got trajectory 1 ... m away from trajectories 0, 2; ...
+    """
+    if len(aligned) == 1:
+        return
+    apart = np.array([np.linalg.norm(aligned - walk, axis=2).max(axis=1) for walk in aligned])
+    if not chained(apart, _size(aligned), _step(aligned))[0].any():
+        return
+    way, allowed, apart = ways_apart(trajectories)
+    others = range(1, way.max() + 1)
+    strays = [f"{_named(way == k)} {apart[way == k][:, way != k].min():.3g} m" for k in others]
+    if strays:
+        raise ValueError(
+            f"trajectories must be walks of one way, got {' and '.join(strays)} away from "
+            f"{_named(way == 0)}; {allowed:.3g} m to the next one would do ({_FAR} of their size, "
+            "less where most are closer): dollop.learn keeps ways apart"
+        )
+
+
+def _size(walks):
+    """Diagonal of the box round a walk in m, the median over walks (K, n, 2)."""
+    return np.median(np.linalg.norm(np.ptp(walks, axis=1), axis=1))
+
+
+def _step(walks):
+    """The longest distance between neighbouring samples in m, the median over walks (K, n, 2)."""
+    return np.median(np.linalg.norm(np.diff(walks, axis=1), axis=2).max(axis=1))
+
+
+def _named(which):
+    """The trajectories where `which` (K,) is true, by number or, if many, by how many they are."""
+    numbers = np.flatnonzero(which)
+    if len(numbers) > _NAMED:
+        return f"{len(numbers)} trajectories"
+    return ("trajectory " if len(numbers) == 1 else "trajectories ") + ", ".join(map(str, numbers))
 
 
 def mean_trajectory(trajectories, n=200):

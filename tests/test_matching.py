@@ -33,7 +33,7 @@ def _squares(places, side=0.4):
 
 
 def _world(seed, n, moved=None, sizes=None, view=0.8):
-    """Two looks at n things that were moved (sd in m) or stand anywhere new, and which is which, -1 where out of view."""
+    """Two looks at n things, moved (sd in m) or anywhere new, and which is which, -1 where out of view."""
     rng = np.random.default_rng(seed)
     before, after, partners = random_layouts(n, rng, moved=moved or 0.4, noise=0.0)
     places = before.centres, after.centres[partners] if moved else random_layouts(n, rng)[0].centres
@@ -141,7 +141,7 @@ def test_beliefs_equal_the_exact_sums_where_few_hang_together():
 
 
 def test_what_is_told_with_a_probability_is_right_as_often():
-    """Of pairs told with p in 320 scenes a share p is right, within 5 points and chance; so of what is accepted 98 %."""
+    """Of pairs told with p in 320 scenes a share p is right, within 5 points and chance; of what is accepted 98 %."""
     told, right, wrong, accepted = [], [], 0, 0
     for seed, n, sizes in product(range(40), (2, 3, 5, 7), (None, _any_size)):
         before, after, partners = _world([seed, n], n, 0.2 + seed / 100, sizes)
@@ -300,7 +300,7 @@ def test_two_boxes_turned_by_a_right_angle_are_a_tie():
     matching = match(before, after)
     assert matching.margin == pytest.approx(0, abs=0.05)
     assert not matching.confident and not matching.sure.any()
-    with pytest.raises(ValueError, match=r"the one and the other cannot .* 50 %.*95 % .*matching=.*matchings="):
+    with pytest.raises(ValueError, match=r"the one and the other cannot .* (49|50) %.*95 % .*matching=.*matchings="):
         match_surely(before, after, NAMES)
 
 

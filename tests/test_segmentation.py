@@ -12,7 +12,9 @@ from dollop.segmentation import (
     best_segments,
     candidate_responses,
     distances,
+    fewest_cuts,
     fewest_segments,
+    lifted_vertices,
     raw_statistics,
     retimed_statistics,
     segment_errors,
@@ -57,6 +59,12 @@ def test_fast_errors_agree_with_one_segment_at_a_time(one_lap):
         assert exact - 1e-6 <= errors[i, j] <= exact * (1.02 if exact > 0.1 * (j - i) else 1 + 1e-6)
 
 
+def fast_distances(points, polylines):
+    """`distances` of points (B, T, 2) to one polyline (V, 2) for each B."""
+    vertices = polylines.transpose(2, 1, 0)
+    return distances(points.transpose(2, 0, 1), vertices, lifted_vertices(vertices), np.arange(len(points)))
+
+
 @settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_fast_distances_are_never_too_small(seed):
@@ -64,11 +72,11 @@ def test_fast_distances_are_never_too_small(seed):
     rng = np.random.default_rng(seed)
     points, polylines = rng.normal(size=(3, 8, 2)), rng.normal(size=(3, 6, 2)).cumsum(axis=1)
     exact = [distance_to_polyline(*each) for each in zip(points, polylines, strict=True)]
-    assert (distances(points, polylines) >= np.array(exact) - 1e-5).all()
+    assert (fast_distances(points, polylines) >= np.array(exact) - 1e-5).all()
     curve = np.linspace(0, 2, 30)
     even = np.stack([curve, np.sin(curve)], axis=1)
     near = points[:1] / 5 + even[12]
-    assert np.allclose(distances(near, even[None])[0], distance_to_polyline(near[0], even))
+    assert np.allclose(fast_distances(near, even[None])[0], distance_to_polyline(near[0], even))
 
 
 def test_raw_statistics_from_running_sums(five_laps):
@@ -95,8 +103,8 @@ def test_retimed_statistics_are_those_of_the_retimed_piece():
 def test_slow_responses_are_followed_to_the_subgoal():
     """Even a slow system's response comes close to its subgoal before it is joined to it."""
     slow = Statistics(np.eye(2)[None], 0.995 * np.eye(2)[None])
-    responses = candidate_responses(slow, np.array([[3.0, 4.0]]))
-    assert np.linalg.norm(responses[0, -2]) < 0.05 * 5 and not responses[0, -1].any()
+    response = candidate_responses(slow, np.array([[3.0], [4.0]]))[..., 0]
+    assert np.linalg.norm(response[:, -2]) < 0.05 * 5 and not response[:, -1].any()
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.1, 2.9])
@@ -115,6 +123,25 @@ def test_a_candidate_is_judged_by_itself():
     decays = np.array([0.5, 0.9, 0.99, 0.999])
     each = [Statistics(np.eye(2)[None], decay * np.eye(2)[None]) for decay in decays]
     together = Statistics(np.tile(np.eye(2), (4, 1, 1)), decays[:, None, None] * np.eye(2))
-    x0 = rng.normal(size=(4, 2))
-    alone = [candidate_responses(s, x0[k : k + 1])[0] for k, s in enumerate(each)]
-    np.testing.assert_allclose(candidate_responses(together, x0), alone)
+    x0 = rng.normal(size=(2, 4))
+    alone = [candidate_responses(s, x0[:, k : k + 1]) for k, s in enumerate(each)]
+    np.testing.assert_allclose(candidate_responses(together, x0), np.concatenate(alone, axis=2))
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.booleans())
+def test_looking_only_at_what_matters_changes_no_cut(seed, retimed):
+    """The fewest cuts, or the refusal, are those from the errors of all segments."""
+    rng = np.random.default_rng(seed)
+    walks = [
+        rng.normal(size=(30, 2)).cumsum(axis=0) + 0.3 * rng.normal(size=(30, 2)) for _ in range(rng.integers(1, 3))
+    ]
+    tolerance, candidates = np.exp(rng.uniform(-4, 1)), int(rng.integers(5, 40))
+    path, statistics = search_input(walks, candidates, retimed)
+    found = []
+    for search in (fewest_cuts, lambda *each: fewest_segments(segment_errors(*each[:2]), each[2])):
+        try:
+            found.append(search(path, statistics, tolerance).tolist())
+        except ValueError as refusal:
+            found.append(str(refusal))
+    assert found[0] == found[1]

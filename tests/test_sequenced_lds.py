@@ -9,7 +9,7 @@ import pytest
 import scipy.io
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from walks import any_walks, moving, walk_figure_eights
+from walks import any_walk, moving, walk_figure_eights
 
 from dollop.laps import laps
 from dollop.lds import LDS
@@ -196,6 +196,16 @@ def test_bad_parameters(one_lap, options, says):
         SequencedLDS.fit(one_lap, **options)
 
 
+@pytest.mark.parametrize("others", [0, 3])
+def test_walks_of_another_way_are_never_averaged(five_laps, others):
+    """A walk backwards is named, with how far it is away and what to do, whether or not it is outnumbered."""
+    walks = [*five_laps[:others], five_laps[3], five_laps[4][::-1]]
+    with pytest.raises(
+        ValueError, match=rf"got trajectory {others + 1} .* m away from .*dollop.learn keeps ways apart"
+    ):
+        SequencedLDS.fit(walks)
+
+
 def test_the_tolerance_that_can_be_kept_is_kept(one_lap):
     """The tolerance named in the error does work, and nothing below it."""
     with pytest.raises(ValueError) as refusal:
@@ -233,10 +243,12 @@ def test_bad_subgoals_and_starts(law):
 
 
 @settings(max_examples=40)
-@given(any_walks, st.booleans())
-def test_any_walks_can_be_fitted(walks, retimed):
-    """However wild the walks, stable segments lead from their mean start to their mean end."""
-    law = SequencedLDS.fit(moving(walks), n_segments=2, retimed=retimed, candidates=12)
+@given(any_walk, st.integers(1, 3), st.booleans())
+def test_any_walk_can_be_fitted(walk, count, retimed):
+    """However wild a walk, alone or repeated, stable segments lead from its mean start to its mean end."""
+    moving([walk])
+    walks = [walk[0] + (1 + 0.03 * k) * (walk - walk[0]) for k in range(count)]
+    law = SequencedLDS.fit(walks, n_segments=2, retimed=retimed, candidates=12)
     assert np.allclose(law.start, np.mean([walk[0] for walk in walks], axis=0))
     assert np.allclose(law.subgoals[-1], np.mean([walk[-1] for walk in walks], axis=0))
     assert np.linalg.norm(law.response()[-1] - law.subgoals[-1]) <= 0.01

@@ -9,12 +9,16 @@ from walks import walk_figure_eights
 from dollop.trajectory import (
     _monotone_warp,
     align,
+    arc_length,
+    at_arc_length,
+    check_one_way,
     check_trajectories,
     check_trajectory,
     distance_to_polyline,
     mean_trajectory,
     resample,
     retime,
+    ways_apart,
 )
 
 
@@ -58,6 +62,16 @@ def test_distance_to_polyline_agrees_with_a_plain_loop():
     edges = list(itertools.pairwise(polyline))
     plain = [min(to_edge(point, *edge) for edge in edges) for point in points]
     assert np.allclose(distance_to_polyline(points, polyline), plain)
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_many_distances_are_those_of_one_point_at_a_time(smooth):
+    """What is divided because it is much is as exact as what is not, for walks and for scattered points."""
+    points, polyline = np.random.default_rng(4).normal(size=(2, 500, 2))
+    if smooth:
+        points, polyline = points.cumsum(axis=0), polyline.cumsum(axis=0)
+    alone = [distance_to_polyline(point[None], polyline)[0] for point in points]
+    assert distance_to_polyline(points, polyline).tolist() == alone
 
 
 def test_distance_to_a_single_point():
@@ -113,6 +127,61 @@ def test_mean_of_one_walk_is_the_walk():
     """The mean of a single trajectory is its resampling."""
     walk = eight(1, 100)
     assert np.allclose(mean_trajectory(walk, 50), resample(resample(walk, 50), 50))
+
+
+def mirrored(walk):
+    """The walk on the other side of the line along which it reaches farthest."""
+    along = np.linalg.svd(walk - walk.mean(axis=0))[2][0]
+    offset = walk - walk[0]
+    return walk[0] + 2 * np.outer(offset @ along, along) - offset
+
+
+def truncated(walk, share=0.7):
+    """The first part of the walk."""
+    return at_arc_length(walk, np.linspace(0, share * arc_length(walk)[-1], len(walk)))
+
+
+def with_detour(walk, aside=1.5):
+    """The walk with a bulge to one side, about as long as it is wide."""
+    way, step = arc_length(walk), np.gradient(walk[len(walk) // 2 :], axis=0)[0]
+    bulge = np.exp(-(((way - way[len(walk) // 2]) / (aside / 2)) ** 2))
+    return walk + aside * np.outer(bulge, np.array([-step[1], step[0]]) / np.linalg.norm(step))
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+@pytest.mark.parametrize("seed", range(4))
+def test_laps_of_one_way_are_one_way(seed, count):
+    """Laps that sway, at offsets of 10 cm, are of one way."""
+    rng = np.random.default_rng(seed)
+    walks = [walk_figure_eights(1, seed=100 * seed + k)[1] + rng.normal(0, 0.1, 2) for k in range(count)]
+    way, allowed, apart = ways_apart(walks)
+    assert not way.any() and 0 < apart.max() < 2 * allowed
+
+
+@pytest.mark.parametrize("others", [1, 2, 4])
+@pytest.mark.parametrize("changed", [mirrored, truncated, with_detour, lambda walk: walk[::-1]])
+def test_what_is_not_the_same_way_is_told(changed, others):
+    """A mirrored, truncated or reversed walk and one with a detour are of another way, even among two walks."""
+    walks = [walk_figure_eights(1, seed)[1][:70] for seed in range(others + 1)]
+    walks[-1] = changed(walks[-1])
+    assert ways_apart(walks)[0].tolist() == [0] * others + [1]
+    with pytest.raises(ValueError, match=rf"got trajectory {others} .* m away from traject"):
+        check_one_way(walks, align(walks)[0])
+
+
+def test_ways_are_told_apart_in_any_order():
+    """Way 0 is the commonest; where a walk stands in the list plays no part."""
+    walks = [walk_figure_eights(1, seed)[1] for seed in range(5)]
+    walks[1], walks[3] = walks[1][::-1], walks[3][::-1]
+    assert ways_apart(walks)[0].tolist() == [0, 1, 0, 1, 0]
+    assert ways_apart(walks[1:] + walks[:1])[0].tolist() == [1, 0, 1, 0, 0]
+
+
+def test_one_walk_and_copies_are_one_way():
+    """There is nothing to tell apart in one walk, nor in a walk and its copies."""
+    walk = walk_figure_eights(1, 0)[1]
+    for walks in ([walk], [walk] * 4):
+        check_one_way(walks, align(walks)[0])
 
 
 @pytest.mark.parametrize(

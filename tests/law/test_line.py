@@ -51,7 +51,7 @@ def test_no_offset_grows_whatever_the_data(walks, retimed, origin, start):
 @given(any_walks, st.booleans(), places)
 def test_every_segment_hands_over_from_any_start(walks, retimed, start):
     """However wild the walks, every segment ends at its subgoal, in finitely many steps."""
-    law = SequencedLDS.fit(moving(walks), n_segments=3, retimed=retimed, candidates=14)
+    law = SequencedLDS.fit(moving(walks)[0], n_segments=3, retimed=retimed, candidates=14)
     parts = law.responses(start)
     assert len(parts) == 3
     for part, goal in zip(parts, law.subgoals, strict=True):

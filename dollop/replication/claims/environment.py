@@ -12,12 +12,12 @@ from dollop.environment import corner_indices, integer_costs
 from dollop.lab.drawn import random_layouts
 from dollop.lab.person import figure_eight
 from dollop.lab.scenes import figure_eight_scene, object_gaps, rearranged
+from dollop.learning.paper import anchors
 from dollop.matching import match
 from dollop.observation import observe
 from dollop.replication import recordings
 from dollop.replication.claims.claim import MORE, MOSTLY, NONE, Criterion, claim
 from dollop.replication.claims.measures import clear_of, is_eight, plain_run
-from dollop.task import anchors
 
 __all__ = []
 

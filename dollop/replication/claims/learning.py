@@ -13,13 +13,14 @@ import numpy as np
 from dollop.cdhmm import SubgoalHMM
 from dollop.lab.drawn import TASKS, draw_demonstrations
 from dollop.lds import LDS
+from dollop.learning.paper import members_along
 from dollop.replication import recordings
 from dollop.replication.baseline import merged
 from dollop.replication.claims.claim import MORE, MOSTLY, Criterion, claim
 from dollop.replication.claims.measures import plain_run
 from dollop.robot.performing import Unicycle, perform
 from dollop.sequenced_lds import SequencedLDS
-from dollop.task import Task, learn, members_along
+from dollop.task import Task, learn
 from dollop.trajectory import distance_to_polyline
 
 __all__ = []
