@@ -288,7 +288,7 @@ def size_of(way):
 
 
 def other_way(task, rng):
-    """The same task done in another way, from the same beginning to the same end.
+    """The same task in another way, from the same beginning to the same end.
 
     Between them, most via-points are on the other side of their object, and half of those beside
     any object.
