@@ -24,6 +24,7 @@ method that refuses a task counts as infinitely far off.
 
 import argparse
 import os
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -35,6 +36,7 @@ from dollop.checks import need
 from dollop.environment import Environment
 from dollop.lab.tasks import KINDS
 from dollop.replication import peers
+from dollop.task import Demonstration
 from dollop.trajectory import resample as evenly_along
 
 POINTS = 200
@@ -108,12 +110,9 @@ def trials(demonstrations):
     scale = DIAGONAL / np.linalg.norm(
         np.ptp(np.concatenate([evenly_in_time(path) for path, _ in demonstrations]), axis=0)
     )
-    walks = [scale * path for path, _ in demonstrations]
-    stood = [as_environment(frames, scale) for _, frames in demonstrations]
-    return [
-        peers.Trial(walks[:k] + walks[k + 1 :], stood[:k] + stood[k + 1 :], stood[k], evenly_in_time(walks[k]))
-        for k in range(len(walks))
-    ]
+    shown = [Demonstration(scale * path, as_environment(frames, scale)) for path, frames in demonstrations]
+    held_out = [(shown[:k] + shown[k + 1 :], each) for k, each in enumerate(shown)]
+    return [peers.Trial(rest, each.environment, evenly_in_time(each.trajectory)) for rest, each in held_out]
 
 
 def as_environment(frames, scale):
@@ -124,8 +123,8 @@ def as_environment(frames, scale):
 
 def by_learning(trial, method, tolerance):
     """The path that a learned task takes, evenly along its length."""
-    response = peers.learned(trial.walks, trial.environments, trial.environment, method, tolerance)
-    return evenly_along(response, POINTS)
+    shown = [replace(each, tolerance=tolerance) for each in trial.demonstrations]
+    return evenly_along(peers.learned(shown, trial.environment, method), POINTS)
 
 
 def error(trial, method):

@@ -6,9 +6,8 @@ which nobody has walked. What the person would have done there is known: the tas
 (`dollop.lab.tasks`).
 """
 
-from dataclasses import dataclass
-from functools import partial
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import chain, product
 
 import joblib
 import numpy as np
@@ -16,6 +15,7 @@ import pandas as pd
 from tqdm import tqdm
 
 from dollop.checks import need
+from dollop.environment import Environment
 from dollop.lab.tasks import draw_layouts, draw_task, size_of, walked
 from dollop.matching import Matching
 from dollop.pose import rotation
@@ -49,23 +49,30 @@ class Trial:
 
     Attributes
     ----------
-    walks : list of N (L_k, 2) float arrays
-        As they were shown, samples evenly in time, in m.
-    environments : list of N Environment
-        Of M objects in the same order: where they stood.
+    demonstrations : list of N Demonstration
+        Of one walk each, samples evenly in time, among M objects in the same order.
     environment : Environment
-        Where they stand now.
+        Where these objects stand now.
     way : (L, 2) float array
         What the person would walk there, in m. Methods are told its ends at most.
     again : (L, 2) float array, optional
         Another walk of the same person there, in m.
     """
 
-    walks: list
-    environments: list
-    environment: object
+    demonstrations: list
+    environment: Environment
     way: np.ndarray
     again: np.ndarray = None
+
+    @property
+    def walks(self):
+        """List of (L_k, 2) float arrays: what was walked, in m."""
+        return [shown.trajectory for shown in self.demonstrations]
+
+    @property
+    def environments(self):
+        """List of Environment: where the objects stood."""
+        return [shown.environment for shown in self.demonstrations]
 
     @property
     def ends(self):
@@ -76,20 +83,16 @@ class Trial:
 # ---- the methods
 
 
-def learned(walks, environments, environment, method="anchored", tolerance=0.02):
-    """Where the task goes that `dollop.learn` makes of the walks, adapted to the objects now.
+def learned(demonstrations, environment, method="anchored"):
+    """Where the task goes that `dollop.learn` makes of demonstrations, adapted to the objects now.
 
     Parameters
     ----------
-    walks : sequence of N (L_k, 2) float arrays
-        In m.
-    environments : sequence of N Environment
-        Of M objects in the same order.
+    demonstrations : sequence of Demonstration
+        Among M objects in the same order.
     environment : Environment
         Of the same M objects.
     method : {"anchored", "paper"}
-    tolerance : float
-        Largest mean error of a segment in m.
 
     Returns
     -------
@@ -97,9 +100,7 @@ def learned(walks, environments, environment, method="anchored", tolerance=0.02)
         In m.
     """
     same = Matching.identity(len(environment))
-    pairs = zip(walks, environments, strict=True)
-    shown = [Demonstration(*pair, tolerance=tolerance) for pair in pairs]
-    task = learn(shown, matchings=[same] * len(shown), method=method)
+    task = learn(demonstrations, matchings=[same] * len(demonstrations), method=method)
     return task.adapt(environment, same).law.response()
 
 
@@ -371,20 +372,12 @@ def regression(mixture, block, t):
 # ---- the comparison
 
 
-def _from_objects(method, trial):
-    return method(trial.walks, trial.environments, trial.environment)
-
-
-def _from_ends(method, trial):
-    return method(trial.walks, trial.ends)
-
-
 METHODS = {
-    "anchored": partial(_from_objects, learned),
-    "paper": partial(_from_objects, partial(learned, method="paper")),
-    "TP-GMM": partial(_from_objects, tp_gmm),
-    "ProMP": partial(_from_ends, promp),
-    "DMP": partial(_from_ends, dmp),
+    "anchored": lambda trial: learned(trial.demonstrations, trial.environment),
+    "paper": lambda trial: learned(trial.demonstrations, trial.environment, "paper"),
+    "TP-GMM": lambda trial: tp_gmm(trial.walks, trial.environments, trial.environment),
+    "ProMP": lambda trial: promp(trial.walks, trial.ends),
+    "DMP": lambda trial: dmp(trial.walks, trial.ends),
     "mean": lambda trial: mean_walk(trial.walks),
 }
 """From a `Trial` to what each method would walk, (L, 2) in m."""
@@ -417,9 +410,9 @@ def drawn_trial(seed, objects=4, count=MOST, kind="anywhere"):
     rng = np.random.default_rng((seed, objects))
     task = draw_task(objects, rng)
     *shown, now = draw_layouts(objects, MOST + 1, rng, kind)
-    walks = [walked(task, centres, rng) for centres in shown]
-    stood = [task.environment(centres) for centres in shown[:count]]
-    return Trial(walks[:count], stood, task.environment(now), task.way(now), walked(task, now, rng))
+    walks = [(walked(task, centres, rng), task.environment(centres)) for centres in shown]
+    given = [Demonstration(*pair) for pair in walks[:count]]
+    return Trial(given, task.environment(now), task.way(now), walked(task, now, rng))
 
 
 def off_way(found, way):
@@ -470,7 +463,7 @@ def study(
     methods : dict
         Functions like those in `METHODS`, by name.
     jobs : int
-        How many trials are worked on at once; the numbers stay the same.
+        How many tasks are worked on at once; the numbers stay the same.
 
     Returns
     -------
@@ -478,27 +471,27 @@ def study(
         One row per number of `objects`, `kind`, number `n`, `seed` and `method`: its `error` (see
         `off_way`), infinite where the method refused, and why it did as `refused`.
     """
-    cases = tqdm(list(product(objects, kinds, numbers, seeds, methods)), desc="drawn tasks")
-    calls = (joblib.delayed(_tried)(*case, methods[case[-1]]) for case in cases)
-    return pd.DataFrame(joblib.Parallel(n_jobs=jobs)(calls))
+    cases = tqdm(list(product(objects, kinds, seeds)), desc="drawn tasks")
+    calls = (joblib.delayed(_tried)(*case, tuple(numbers), methods) for case in cases)
+    return pd.DataFrame(chain.from_iterable(joblib.Parallel(n_jobs=jobs)(calls)))
 
 
-def _tried(objects, kind, n, seed, method, answer):
-    """A row of the study."""
-    trial = drawn_trial(seed, objects, n, kind)
-    row = {
-        "objects": objects,
-        "kind": kind,
-        "n": n,
-        "seed": seed,
-        "method": method,
-        "error": np.inf,
-        "refused": "",
-    }
+def _tried(objects, kind, seed, numbers, methods):
+    """The rows of one task. Its demonstrations are shared, so that each is segmented once."""
+    whole, rows = drawn_trial(seed, objects, max(numbers), kind), []
+    for n, (method, answer) in product(numbers, methods.items()):
+        row = {"objects": objects, "kind": kind, "n": n, "seed": seed, "method": method}
+        few = replace(whole, demonstrations=whole.demonstrations[:n])
+        rows.append(row | _judged(answer, few))
+    return rows
+
+
+def _judged(answer, trial):
+    """How far off a method's answer is, and why there is none where it refuses."""
     try:
-        return row | {"error": off_way(answer(trial), trial.way)}
+        return {"error": off_way(answer(trial), trial.way), "refused": ""}
     except ValueError as error:
-        return row | {"refused": str(error)}
+        return {"error": np.inf, "refused": str(error)}
 
 
 def median_interval(values, level=0.95, draws=2000):

@@ -85,7 +85,7 @@ def test_primitives_reach_the_ends_that_they_are_told(method, within, count):
 def test_trials_grow_by_one_demonstration():
     """More demonstrations are the same ones and more; the layout to come and the truth stay."""
     few, many = peers.drawn_trial(5, count=2), peers.drawn_trial(5, count=7)
-    assert len(few.walks) == len(few.environments) == 2 and len(many.walks) == len(many.environments) == 7
+    assert len(few.demonstrations) == 2 and len(many.demonstrations) == 7
     assert all(np.array_equal(one, other) for one, other in zip(few.walks, many.walks, strict=False))
     assert np.array_equal(few.way, many.way) and np.array_equal(few.again, many.again)
     assert peers.off_way(few.again, few.way) < 3 < peers.off_way(peers.mean_walk(few.walks), few.way)
@@ -95,7 +95,7 @@ def test_learning_by_the_public_calls_is_right_where_nothing_moved():
     """The walk itself, within its tolerance, by either method."""
     trial = peers.drawn_trial(6, count=2, kind="still")
     for method in ("anchored", "paper"):
-        found = peers.learned(trial.walks, trial.environments, trial.environment, method)
+        found = peers.learned(trial.demonstrations, trial.environment, method)
         assert peers.off_way(found, trial.way) < 3
 
 
