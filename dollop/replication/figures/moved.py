@@ -30,13 +30,14 @@ FLOOR = "walked again"
 def figure_x3():
     """Beyond the paper: tasks among objects that stand somewhere else each time, shown more and more often.
 
-    Each task is drawn: via-points beside some of four objects, of which others play no part; a person
-    walks it in layouts that have nothing in common, and is to be foretold in one more. Told is how far
-    the person would be from what a method would walk, in the median of the tasks, with the 95 %
-    interval of that median. Dotted is the same person, walking it again: nobody can do better. A method
-    that learns what each place follows gains from each demonstration; one that cannot is no better
-    from ten than from one. The methods of others are set up as their advocates would, and two of them
-    are told where the way truly begins and ends, which ours is not.
+    Each task is drawn: via-points beside some of four objects, of which others play no part; a
+    person walks it in layouts that have nothing in common, and is to be foretold in one more. Told
+    is how far the person's way is from what a method would walk, in the median of the tasks, with
+    the 95 % interval of that median. Dotted is the same person, walking it again: nobody can do
+    better. From one demonstration, what a place follows can only be guessed from what is near it;
+    the second tells, and further ones make the place sure. The methods of others are set up as
+    their advocates would, and two of them are told where the way truly begins and ends, which ours
+    is not.
     """
     methods = {name: peers.DRAWN[name] for name in (*LINES, FLOOR)}
     seeds = range(FIRST, FIRST + TASKS)
