@@ -20,11 +20,11 @@ from dollop.lab.tasks import draw_layouts, draw_task, size_of, walked
 from dollop.matching import Matching
 from dollop.pose import rotation
 from dollop.task import Demonstration, learn
-from dollop.trajectory import distance_to_polyline
+from dollop.trajectory import distance_to_polyline, resample
 
 __all__ = [
-    "DRAWN", "METHODS", "Trial", "dmp", "drawn_trial", "learned", "mean_walk", "median_interval", "off_way",
-    "promp", "regression", "study", "summary", "tp_gmm",
+    "DRAWN", "METHODS", "Trial", "dmp", "drawn_trial", "learned", "mean_walk", "median_interval",
+    "off_way", "off_way_in_order", "promp", "regression", "study", "summary", "tp_gmm", "warped_distance",
 ]  # fmt: skip
 
 SAMPLES = 100
@@ -440,6 +440,58 @@ def off_way(found, way):
     return float(100 * distance_to_polyline(way, found).mean() / size_of(way))
 
 
+def off_way_in_order(found, way):
+    """How far off, place by place in their order: `off_way` for what may swing far between places.
+
+    Parameters
+    ----------
+    found : (L, 2) array_like
+        In m.
+    way : (K, 2) float array
+        At equal distances, in m.
+
+    Returns
+    -------
+    float
+        `warped_distance` of the two, both at equal distances, in % of the way's size.
+
+    Examples
+    --------
+    Out and back once more is near every place, and yet another way.
+
+    >>> way = np.linspace([0.0, 0.0], [3.0, 0.0], 31)
+    >>> longer = np.array([[0.0, 0.0], [0.0, 2.0], [0.0, 0.0], [3.0, 0.0]])
+    >>> round(off_way(longer, way), 6), off_way_in_order(longer, way) > 10
+    (0.0, True)
+    """
+    return float(100 * warped_distance(resample(found, len(way)), way) / size_of(way))
+
+
+def warped_distance(one, other):
+    """Mean distance of two paths along their dynamic-time-warping path, the one of least total.
+
+    Parameters
+    ----------
+    one, other : (L, 2) and (K, 2) float array
+        In m.
+
+    Returns
+    -------
+    float
+        In m.
+    """
+    distances = np.linalg.norm(one[:, None] - other, axis=2)
+    before = [(0.0, 0)] + [(np.inf, 0)] * len(other)
+    for row in distances.tolist():
+        now = [(np.inf, 0)]
+        for j, distance in enumerate(row):
+            total, length = min(before[j], before[j + 1], now[j], key=lambda end: end[0])
+            now.append((total + distance, length + 1))
+        before = now
+    total, length = before[-1]
+    return total / length
+
+
 def study(
     objects=(4,),
     numbers=(1, 2, 3, 5, 10),
@@ -447,6 +499,7 @@ def study(
     kinds=("anywhere",),
     methods=DRAWN,
     jobs=1,
+    measure=off_way,
 ):
     """Let every method say where drawn tasks go, from the same demonstrations.
 
@@ -464,32 +517,34 @@ def study(
         Functions like those in `METHODS`, by name.
     jobs : int
         How many tasks are worked on at once; the numbers stay the same.
+    measure : callable
+        `off_way` or `off_way_in_order`.
 
     Returns
     -------
     pandas.DataFrame
-        One row per number of `objects`, `kind`, number `n`, `seed` and `method`: its `error` (see
-        `off_way`), infinite where the method refused, and why it did as `refused`.
+        One row per number of `objects`, `kind`, number `n`, `seed` and `method`: its `error` by the
+        measure, infinite where the method refused, and why it did as `refused`.
     """
     cases = tqdm(list(product(objects, kinds, seeds)), desc="drawn tasks")
-    calls = (joblib.delayed(_tried)(*case, tuple(numbers), methods) for case in cases)
+    calls = (joblib.delayed(_tried)(*case, tuple(numbers), methods, measure) for case in cases)
     return pd.DataFrame(chain.from_iterable(joblib.Parallel(n_jobs=jobs)(calls)))
 
 
-def _tried(objects, kind, seed, numbers, methods):
+def _tried(objects, kind, seed, numbers, methods, measure):
     """The rows of one task. Its demonstrations are shared, so that each is segmented once."""
     whole, rows = drawn_trial(seed, objects, max(numbers), kind), []
     for n, (method, answer) in product(numbers, methods.items()):
         row = {"objects": objects, "kind": kind, "n": n, "seed": seed, "method": method}
         few = replace(whole, demonstrations=whole.demonstrations[:n])
-        rows.append(row | _judged(answer, few))
+        rows.append(row | _judged(answer, few, measure))
     return rows
 
 
-def _judged(answer, trial):
+def _judged(answer, trial, measure):
     """How far off a method's answer is, and why there is none where it refuses."""
     try:
-        return {"error": off_way(answer(trial), trial.way), "refused": ""}
+        return {"error": measure(answer(trial), trial.way), "refused": ""}
     except ValueError as error:
         return {"error": np.inf, "refused": str(error)}
 

@@ -115,6 +115,21 @@ def test_a_study_is_the_same_with_two_at_once_and_tells_refusals():
     assert peers.summary(refused).refused.tolist() == [3]
 
 
+def test_warping_finds_the_best_of_all_alignments():
+    """Of two short paths, by trying all of them: least total distance, told per step."""
+
+    def totals(i, j):
+        """(total, steps) of every alignment that ends at places i and j."""
+        here = np.linalg.norm(one[i] - other[j])
+        before = [(i - a, j - b) for a, b in ((1, 0), (0, 1), (1, 1)) if i >= a and j >= b]
+        return [(t + here, n + 1) for pair in before for t, n in totals(*pair)] or [(here, 1)]
+
+    rng = np.random.default_rng(9)
+    one, other = rng.normal(size=(5, 2)), rng.normal(size=(4, 2))
+    total, steps = min(totals(4, 3))
+    assert peers.warped_distance(one, other) == pytest.approx(total / steps)
+
+
 def test_an_interval_holds_the_median_and_narrows_with_more_values():
     """A bootstrap interval of 400 values is less than half as wide as that of 25."""
     values = np.random.default_rng(7).normal(5, 1, 400)
