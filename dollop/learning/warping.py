@@ -14,8 +14,8 @@ import numpy as np
 
 __all__ = ["CUT", "alikeness", "warped"]
 
-SPREAD, CUT = 0.15, 8.0
-"""m and nats: how far walks miss the same place; and from where on farther is no less alike."""
+CUT = 8.0
+"""Nats: from where on farther is no less alike."""
 SKIPPED, BEYOND = 3.0, 8.0
 """Nats: what it costs that a place at either end has no sample, for a walk may be cut short; and
 that a sample has no place, for the way should hold all that was shown."""
@@ -23,7 +23,7 @@ FEWEST = 1e-2
 """Share: a frame that a place follows less than that says nothing of it."""
 
 
-def alikeness(posterior, candidates, local, frames, points):
+def alikeness(posterior, candidates, local, frames, points, spread):
     """How unlike each place of a way and each sample of a walk are.
 
     Parameters
@@ -36,6 +36,8 @@ def alikeness(posterior, candidates, local, frames, points):
         Of the D walks.
     points : (D, M, 2) float array
         The walks, in m.
+    spread : float
+        How far walks miss the same place, in m.
 
     Returns
     -------
@@ -52,7 +54,7 @@ def alikeness(posterior, candidates, local, frames, points):
         spot = np.einsum("dlfk,f->dlk", spots[:, rows][:, :, used], weights[used])
         gap = ((spot[:, :, None] - points[:, None]) ** 2).sum(axis=3)
         there = frames.present[:, used].all(axis=1)[:, None, None] * probability[rows, None]
-        likelihood[:, rows] += there * np.exp(-gap / (4 * SPREAD**2))
+        likelihood[:, rows] += there * np.exp(-gap / (4 * spread**2))
     return np.minimum(-np.log(np.maximum(likelihood, 1e-300)), CUT)
 
 

@@ -18,8 +18,9 @@ __all__ = ["MISSED", "PLACES", "Laid", "divided", "laid_together"]
 
 PLACES = 80
 """Of a way: about one every 0.15 m of a walk through a room."""
-ROUNDS, REFERENCES = 4, 5
-"""Times that walks are laid onto the way, and from how many of them it begins."""
+SPREADS, REFERENCES = (0.5, 0.35, 0.25, 0.25), 5
+"""m: how far walks may miss the same place, each time that they are laid onto the way, wide at first
+while it is hardly known; and from how many of the walks it begins."""
 PULL = 5.0
 """Nats: how much less alike a place and a sample are that lie a whole way apart."""
 STRETCH = 0.1
@@ -95,8 +96,8 @@ def _laid_onto(curves, frames, reference):
     covered, cost, beyond = np.ones((count, PLACES), bool), np.zeros(count), np.zeros(count)
     places = tied_places(points[[reference]], covered[[reference]], frames.of([reference]))
     local = places.local
-    for turn in range(ROUNDS if count > 1 else 0):
-        unlike = alikeness(places.posterior, places.candidates, local, frames, curves)
+    for turn, spread in enumerate(SPREADS if count > 1 else ()):
+        unlike = alikeness(places.posterior, places.candidates, local, frames, curves, spread)
         at, covered, cost, beyond = warped(unlike + _SLIP)
         if turn == 0:
             at[reference], covered[reference] = np.arange(PLACES), True
