@@ -29,7 +29,14 @@ from dollop.environment import Environment
 from dollop.matching import match_surely
 from dollop.pose import rotation, wrapped
 
-__all__ = ["Association", "FrameAssociation", "Frames", "associate", "associate_with_frames"]
+__all__ = [
+    "Association",
+    "FrameAssociation",
+    "Frames",
+    "associate",
+    "associate_with_frames",
+    "layout_turn",
+]
 
 _EPSILON = 0.05**2  # m²: corners are not known better than to a cell of the foreground grid
 

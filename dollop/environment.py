@@ -141,7 +141,12 @@ class Environment:
         assumed = np.zeros(boxes.shape, bool) if self.assumed is None else np.array(self.assumed, bool)
         if assumed.shape != boxes.shape:
             raise ValueError(f"assumed must hold four sides for each box, got shape {assumed.shape} for {len(boxes)}")
-        put_in(self, boxes=boxes, assumed=assumed, directions=checked_directions(self.directions, len(boxes)))
+        put_in(
+            self,
+            boxes=boxes,
+            assumed=assumed,
+            directions=checked_directions(self.directions, len(boxes)),
+        )
 
     def __len__(self):
         return len(self.boxes)

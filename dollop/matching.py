@@ -12,11 +12,11 @@ were carried off, so that object a at x and object b at y are the same with the 
     f(a, b) = (1 - c) (u N(y; h(x), blur) + (1 - u) N(y; h(x), blur + sigma^2)) + c / A
     s(a, b) = 0.98 N(size_b; size_a) + 0.02 B
 
-with `blur` what the sides of boxes are off, B the density of any size, at most 2 per m^2, and g that of a
-new object: a size of those beside it, or any. An object that is left out has gone, one in twenty,
-or stands where the other environment has not seen: all it costs is q = 1 - 0.95 p, where p says how
-surely its place was seen, averaged over where it may have been moved. Where nobody knows what was
-seen, p is the same for all, and unknown. A matching of k pairs then has the probability
+with `blur` what the sides of boxes are off, B the density of any size, at most 2 per m^2, and g
+that of a new object: a size of those beside it, or any. An object that is left out has gone, one in
+twenty, or stands where the other environment has not seen: all it costs is q = 1 - 0.95 p, where p
+says how surely its place was seen, averaged over where it may have been moved. Where nobody knows
+what was seen, p is the same for all, and unknown. A matching of k pairs then has the probability
 
     w_k / Z  product of  A f s / sqrt(g_a g_b) * sqrt((1 - q_a) (1 - q_b))  over its pairs (a, b)
              product of  q  over all that is left out
@@ -25,11 +25,10 @@ where w_k = (N + M - k - 1)! counts in how many ways K may be made of them. Z is
 partial matchings: row by row over sets of columns, exactly, up to twelve objects; by belief
 propagation for more. What nobody knows is summed over as well: sigma, half, once or one and a half
 times 0.4 m; u, none or a half; c, 0.01 or 0.1; p, from a half to 1; and whether sizes tell anything
-at all, in one scene of ten not. So is what h did to the layout
-as a whole: nothing; shift it anywhere, 4 nats less likely beforehand; turn it by any angle, 4; both,
-8; or put it up anew, 1.4, where f = 1 / A and p may be anything. Each shift or turn counts with the
-room that it is uncertain by, of all that there are (Laplace): some turn fits any two objects, and
-that is no evidence.
+at all, in one scene of ten not. So is what h did to the layout as a whole: nothing; shift it
+anywhere, 4 nats less likely beforehand; turn it by any angle, 4; both, 8; or put it up anew, 1.4,
+where f = 1 / A and p may be anything. Each shift or turn counts with the room that it is uncertain
+by, of all that there are (Laplace): some turn fits any two objects, and that is no evidence.
 """
 
 from dataclasses import dataclass, replace

@@ -212,7 +212,16 @@ class Task:
             tied = associate(anchors(law), environment, m=max(1, len(environment.corners)))
             return cls(law, environment, tied, None, shown, notes_of(shown), partners=partners)
         ways, _, notes = learn_anchored(shown, partners, environment, merged=False)
-        blank = cls(None, environment, None, None, shown, (*notes_of(shown), *notes), partners=partners, learned=ways)
+        blank = cls(
+            None,
+            environment,
+            None,
+            None,
+            shown,
+            (*notes_of(shown), *notes),
+            partners=partners,
+            learned=ways,
+        )
         return _laid_out(blank, environment, blank.objects)
 
     def add(self, demonstration, spread=None, matching=None):
@@ -238,7 +247,10 @@ class Task:
         """
         known = [None if goes is None else Matching.of_partners(composed(goes, self.objects)) for goes in self.partners]
         known += [None] * (len(self.demonstrations) - len(known))
-        shown, method = [*self.demonstrations, demonstration], "anchored" if self.learned else "paper"
+        shown, method = (
+            [*self.demonstrations, demonstration],
+            "anchored" if self.learned else "paper",
+        )
         return learn(shown, self.environment, [*known, matching], method, spread)
 
     def adapt(self, environment, matching=None, turned=False):
@@ -276,7 +288,13 @@ class Task:
             law = self.law.with_subgoals(subgoals, start, turned)
             tied = self.association.carried(environment, matching)
             return replace(
-                self, law=law, environment=environment, association=tied, notes=told, ways=(law,), objects=objects
+                self,
+                law=law,
+                environment=environment,
+                association=tied,
+                notes=told,
+                ways=(law,),
+                objects=objects,
             )
         turn = layout_turn_of(self.environment, environment, matching) if turned else 0.0
         return _laid_out(replace(self, notes=told), environment, objects, turn)
@@ -294,7 +312,10 @@ class Task:
         return np.array([self._error(k) for k in range(len(self.demonstrations))])
 
     def _error(self, k):
-        shown, partners = self.demonstrations[k], self.partners[k] if k < len(self.partners) else None
+        shown, partners = (
+            self.demonstrations[k],
+            self.partners[k] if k < len(self.partners) else None,
+        )
         if not self.learned:
             names, given = ("the task's environment", f"that of demonstration {k}"), None
             if partners is not None:
@@ -427,5 +448,14 @@ def learn(demonstrations, environment=None, matchings=None, method="anchored", s
         law, tied, model = learn_as_paper(shown, [found[k] for k in used], environment, spread)
         return Task(law, environment, tied, model, demonstrations, notes, partners=partners)
     ways, model, told = learn_anchored(demonstrations, partners, environment, spread=spread)
-    blank = Task(None, environment, None, model, demonstrations, (*notes, *told), partners=partners, learned=ways)
+    blank = Task(
+        None,
+        environment,
+        None,
+        model,
+        demonstrations,
+        (*notes, *told),
+        partners=partners,
+        learned=ways,
+    )
     return _laid_out(blank, environment, blank.objects)

@@ -94,6 +94,7 @@ def test_turned_subgoals_turn_the_response(task):
 def test_by_default_no_law_is_turned(task):
     """Adapted as the paper does it, every LDS keeps its matrix, however the cans moved; turned ones do not."""
     boxes = Environment(CANS + np.tile([[0.0, 0.5], [0.0, -0.5]], 2))
+    task = Task.of(task.demonstrations[0], method="paper")
     plain, turned = task.adapt(boxes), task.adapt(boxes, turned=True)
     assert all((a.A == b.A).all() for a, b in zip(plain.law.segments, task.law.segments, strict=True))
     assert max(np.abs(a.A - b.A).max() for a, b in zip(turned.law.segments, task.law.segments, strict=True)) > 0.01
@@ -147,13 +148,13 @@ def damaged(change):
         (lambda content: json.dumps(content)[:500], "not a task"),
         (lambda content: "[]", "format must be"),
         (lambda content: "", "empty"),
-        (damaged(lambda c: c.update(version=99)), "version must be 1, got 99"),
+        (damaged(lambda c: c.update(version=99)), "version must be 1 or 2, got 99"),
         (damaged(lambda c: c.pop("segments")), "segments"),
         (damaged(lambda c: c.update(segments=[])), "number of segments must be positive and finite, got 0"),
         (damaged(lambda c: c["segments"].pop()), r"speeds must have shape \(\d,\), got"),
         (damaged(lambda c: c["segments"][0].update(G0=[[1, 0], [0, 1]], G1=[[2, 0], [0, 2]])), "spectral radius"),
-        (damaged(lambda c: c["boxes"].pop()), "corners must be 0 to 3"),
-        (damaged(lambda c: c.update(version=True)), "version must be 1, got True"),
+        (damaged(lambda c: c.update(environment={"boxes": c["environment"]["boxes"][:1]})), "must be below"),
+        (damaged(lambda c: c.update(version=True)), "version must be 1 or 2, got True"),
         (damaged(lambda c: c["segments"][0].update(G0=[[1, None], [0, 1]])), "must be finite"),
         (damaged(lambda c: c["speeds"].__setitem__(0, -1.0)), "speeds must be positive and finite, got -1"),
         (
@@ -167,7 +168,7 @@ def damaged(change):
 )
 def test_a_damaged_file_is_a_format_error(task, tmp_path, damage, message):
     """The error names the file and what is wrong with it."""
-    task.save(tmp_path / "good.json")
+    Task.of(task.demonstrations[0], method="paper").save(tmp_path / "good.json")
     bad = tmp_path / "bad.json"
     bad.write_text(damage(json.loads((tmp_path / "good.json").read_text())))
     with pytest.raises(FormatError, match=message) as error:
@@ -223,7 +224,7 @@ def test_a_demonstration_elsewhere_is_mapped_to_the_first_environment():
     first, second = task.model.sequences
     np.testing.assert_allclose(second, first, atol=1e-6)
     assert task.model.outliers() == () and len(task.model.means) == len(first)
-    np.testing.assert_allclose(task.law.response(), here.law.response(), atol=1e-6)
+    assert here.law.error(task.law.response()) < 0.001
 
 
 def test_learned_start_speeds_and_laws_are_means_over_the_demonstrations():
@@ -231,7 +232,7 @@ def test_learned_start_speeds_and_laws_are_means_over_the_demonstrations():
     walks = [eight(noise=0.02, seed=1), eight((0.12, -0.06), noise=0.02, seed=2)]
     walks[1] = walks[1][::2]  # twice as fast
     demonstrations = [Demonstration(walk, Environment(CANS)) for walk in walks]
-    task, laws = learn(demonstrations), [shown.law for shown in demonstrations]
+    task, laws = learn(demonstrations, method="paper"), [shown.law for shown in demonstrations]
     members = members_along(task.model)
     assert max(len(shared) for shared in members) == 2
     np.testing.assert_allclose(task.law.start, np.mean([walk[0] for walk in walks], axis=0), atol=1e-6)
@@ -252,7 +253,7 @@ def test_a_demonstration_without_one_of_the_cans_still_teaches():
     task = learn([Demonstration(eight(), Environment(THREE)), Demonstration(walk, Environment(boxes))])
     assert task.model.outliers() == () and len(task.environment) == 3
     assert np.isfinite(task.association.weights).all()
-    np.testing.assert_allclose(task.association.weights.sum(axis=1), 1)
+    np.testing.assert_allclose(task.association.weights.sum(axis=1), 1, atol=1e-4)
     assert np.linalg.norm(task.law.subgoals[-1] - eight()[-1]) < 0.1
     moved = task.adapt(Environment(THREE + 0.2))
     np.testing.assert_allclose(moved.law.subgoals, task.law.subgoals + 0.2, atol=1e-6)
@@ -301,14 +302,15 @@ def test_a_demonstration_tells_what_was_dropped(notes):
 
 
 def test_a_task_tells_what_its_demonstrations_told(tmp_path):
-    """Once each, adapted or added to; notes are not saved."""
+    """Once each, adapted or added to, saved and loaded."""
     one, other = Demonstration.of(observed(2.5)), Demonstration.of(observed(3.5))
     task = learn([one, other, one])
-    assert task.notes == (*one.notes, *other.notes) and len(task.notes) == 2
+    doubts = tuple(note for note in task.notes if note.doubt)
+    assert doubts == (*one.notes, *other.notes) and len(doubts) == 2
     assert Task.of(one).notes == task.adapt(Environment(CANS + 0.3)).notes[:1] == one.notes
-    assert Task.of(one).add(other).notes == task.notes
+    assert Task.of(one).add(other).notes[:2] == task.notes[:2]
     task.save(tmp_path / "task.json")
-    assert Task.load(tmp_path / "task.json").notes == ()
+    assert Task.load(tmp_path / "task.json").notes == task.notes
     assert Task.of(Demonstration(eight(), Environment(CANS))).notes == ()
 
 
@@ -329,18 +331,44 @@ def test_what_cannot_be_segmented_is_named():
 
 
 def test_no_objects_are_no_place_to_learn_in():
-    """An environment without objects is refused, not replaced by the demonstration's."""
-    with pytest.raises(ValueError, match="leaves out all of subgoal 0"):
+    """An environment without the demonstration's objects is refused, not replaced by the demonstration's."""
+    with pytest.raises(ValueError, match="must have an object in common, or have none, got 2 and 0"):
         learn([Demonstration(eight(), Environment(CANS))], Environment([]))
 
 
 def test_nothing_to_learn_from():
-    """No demonstration is an error; so is one whose environment could be either way round, named by its number."""
+    """No demonstration is an error; so is one that could be either way round, where it is the only one."""
     with pytest.raises(ValueError, match="at least one demonstration"):
         learn([])
     turned = Environment([[4.3, 1.4, 4.7, 1.8], [4.3, 5.4, 4.7, 5.8]])
-    with pytest.raises(ValueError, match="demonstration 1 and .* confidence"):
-        learn([Demonstration(eight(), Environment(CANS)), Demonstration(eight(), turned)])
-    alone = Environment(CANS[:1])
-    with pytest.raises(ValueError, match="demonstration 1 and .* confidence"):
-        learn([Demonstration(eight(), Environment(CANS)), Demonstration(eight(), Environment(alone.boxes + 2.0))])
+    with pytest.raises(ValueError, match="no demonstration can be learned from: demonstration 0 and .* confidence"):
+        learn([Demonstration(eight(), turned)], Environment(CANS))
+
+
+@pytest.mark.parametrize("method", ["anchored", "paper"])
+def test_a_demonstration_that_cannot_be_matched_is_set_aside(method):
+    """It is named, with the threshold and how to give the matching; the others teach as if it were not there."""
+    turned = Environment([[4.3, 1.4, 4.7, 1.8], [4.3, 5.4, 4.7, 5.8]])
+    right, lost = Demonstration(eight(), Environment(CANS)), Demonstration(eight(), turned)
+    task = learn([right, lost], method=method)
+    np.testing.assert_allclose(task.law.response(), learn([right], method=method).law.response(), atol=1e-9)
+    [note] = task.notes
+    assert note.kind == "set aside" and "demonstration 1" in note.text
+    assert "95 %" in note.text and "matchings=" in note.text
+    given = learn([right, lost], matchings=[None, Matching.of_partners([0, 1])], method=method)
+    assert not [each for each in given.notes if each.kind == "set aside"]
+
+
+@pytest.mark.parametrize(
+    ("matchings", "message"),
+    [
+        ([None], "one for each of 2 demonstrations, got 1"),
+        ([None, "mine"], "must be a Matching, .* got 'mine'"),
+        ([None, Matching.identity(3)], "must go from the 8 corners of demonstration 1 .* got 12 indices"),
+        ([None, Matching(np.array([0, 1, 2, 3] * 2), 0.0, 1.0, True)], "must not send two corners to one"),
+    ],
+)
+def test_matchings_that_do_not_belong_are_refused(matchings, message):
+    """Their number, what they are, and where they go."""
+    with pytest.raises(ValueError, match=message):
+        learn([Demonstration(eight(), Environment(CANS))] * 2, matchings=matchings)

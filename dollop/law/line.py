@@ -12,9 +12,10 @@ decays by a rate of its own instead, e' = B e with
 
 d being half the segment's way; far from the line w is 0, and the LDS is alone.
 
-Theorem. Whatever the data, no step lets the offset grow, and every segment hands over after finitely
-many of them, from any start. Proof. In the segment's Lyapunov norm |e|_V^2 = e^T G0^-1 e there is a
-q < 1 such that |A e|_V <= q |e|_V (see `LDS.lyapunov`; G0 is regular). So for any w from 0 to 1
+Theorem. Whatever the data, no step lets the offset grow, and every segment hands over after
+finitely many of them, from any start. Proof. In the segment's Lyapunov norm |e|_V^2 = e^T G0^-1 e
+there is a q < 1 such that |A e|_V <= q |e|_V (see `LDS.lyapunov`; G0 is regular). So for any w from
+0 to 1
 
     |B e|_V <= (1 - w) q |e|_V + w c |e|_V <= max(q, c) |e|_V.
 
@@ -40,7 +41,8 @@ __all__ = ["FADE", "Fading", "Line", "lines_of"]
 
 FADE = 0.15
 """m of way over which an offset from the line fades to 1/e: about the distance between the wheels and
-the centre of a robot, which turns on the spot. In less the way back would be a corner, and in more a
+the centre of a robot, which turns on the spot. In less the way back would be a corner, and in more
+a
 push at one object would not be over at the next."""
 
 PARTS = 64  # of a segment's way, no place being farther from the next: 4 cm of 3 m
@@ -85,8 +87,8 @@ class Line:
         Returns
         -------
         Line
-            Its places lie at most a 64th of the way apart, on the smooth (Catmull-Rom) curve through
-            the states.
+            Its places lie at most a 64th of the way apart, on the smooth (Catmull-Rom) curve
+            through the states.
 
         Examples
         --------

@@ -1,8 +1,9 @@
 """Learning in object frames: which object each place of a task follows, from all demonstrations (Sec. IV-B and V).
 
-Alignment, association and merging decide together: `dollop.learning.ways` lays the walks onto each other and divides
-them where they go different ways, `dollop.learning.places` tells what each place follows. Only then are subgoals mapped
-to one environment, each by what its place follows, and merged to a CDHMM.
+Alignment, association and merging decide together: `dollop.learning.ways` lays the walks onto each
+other and divides them where they go different ways, `dollop.learning.places` tells what each place
+follows. Only then are subgoals mapped to one environment, each by what its place follows, and
+merged to a CDHMM.
 """
 
 from dataclasses import replace
@@ -32,8 +33,8 @@ def learn_anchored(demonstrations, partners, environment, spread=None, merged=Tr
     ----------
     demonstrations : sequence of D Demonstration
     partners : sequence of D (int array or None)
-        For each object of a demonstration, which object of the environment it is, -1 for none; None for a demonstration
-        that is set aside.
+        For each object of a demonstration, which object of the environment it is, -1 for none; None
+        for a demonstration that is set aside.
     environment : Environment
         The one to learn in.
     spread : float, optional
@@ -83,11 +84,12 @@ def _at_home(laid, frames, home, shown, curves, members):
 
 def _law_of(shown, k):
     """The law of demonstration k, at a looser tolerance where its own cannot be kept: for its subgoals it does."""
+    refused = None
     for looser in (1, 2, 4):
         try:
             return shown.law if looser == 1 else replace(shown, tolerance=looser * shown.tolerance).law
         except ValueError as error:
-            refused = error
+            refused = refused or error
     raise ValueError(f"demonstration {k}: {refused}") from refused
 
 
@@ -99,11 +101,20 @@ def _told(members, laid):
         if inside[0] > WHOLE or inside[-1] < 1 - WHOLE:
             part = f"{100 * inside[0]:.0f} to {100 * inside[-1]:.0f} %"
             notes.append(
-                Note("part", f"demonstration {k} shows only {part} of the way; the rest is from others", False)
+                Note(
+                    "part",
+                    f"demonstration {k} shows only {part} of the way; the rest is from others",
+                    False,
+                )
             )
         if missed > MISSED:
             rule = f"more than the {MISSED} m that walks of one way differ"
-            notes.append(Note("missed", f"the task misses demonstration {k} by {missed:.2f} m over a stretch, {rule}"))
+            notes.append(
+                Note(
+                    "missed",
+                    f"the task misses demonstration {k} by {missed:.2f} m over a stretch, {rule}",
+                )
+            )
     return notes
 
 
@@ -112,7 +123,11 @@ def _told_of_ways(ways):
         return []
     which = "; ".join(", ".join(map(str, way.members)) for way in ways)
     return [
-        Note("ways", f"shown in {len(ways)} ways that have not all in common, by the demonstrations {which}", False)
+        Note(
+            "ways",
+            f"shown in {len(ways)} ways that have not all in common, by the demonstrations {which}",
+            False,
+        )
     ]
 
 
@@ -134,7 +149,8 @@ def tied_to_corners(way, places, law, environment, objects):
     Returns
     -------
     Association
-        Of K + 1 places with 4 N corners. Weights of a row sum to less than 1 where it follows the world too.
+        Of K + 1 places with 4 N corners. Weights of a row sum to less than 1 where it follows the
+        world too.
     """
     points = anchors(law)
     at = which_places(points, places)
@@ -162,7 +178,8 @@ def told_of_places(ways, tolerances, partners):
     Returns
     -------
     list of Note
-        Which stretches hang on objects that are not there, and which laws are looser than was asked.
+        Which stretches hang on objects that are not there, and which laws are looser than was
+        asked.
     """
     notes = []
     for number, (way, kept) in enumerate(zip(ways, tolerances, strict=True)):

@@ -1,7 +1,7 @@
 """The frames from which a place can be seen: each object, and the world (beyond the paper).
 
-A frame has an origin and a direction. An object whose direction is known is two frames, one that turns with it and one
-that does not; the world is the last frame, at the map's origin.
+A frame has an origin and a direction. An object whose direction is known is two frames, one that
+turns with it and one that does not; the world is the last frame, at the map's origin.
 """
 
 from dataclasses import dataclass
@@ -106,7 +106,8 @@ def frames_of(environments, partners, corners):
     Returns
     -------
     Frames
-        Of N objects, of those among them whose direction is known wherever they stand, and of the world.
+        Of N objects, of those among them whose direction is known wherever they stand, and of the
+        world.
     """
     n = len(corners)
     stood = [_stood(environment, goes, n) for environment, goes in zip(environments, partners, strict=True)]

@@ -126,7 +126,8 @@ def matchings_into(environment, demonstrations, given=None):
     Raises
     ------
     ValueError
-        Another number of matchings than of demonstrations, one that belongs to others, or none left.
+        Another number of matchings than of demonstrations, one that belongs to others, or none
+        left.
     """
     given = [None] * len(demonstrations) if given is None else list(given)
     if len(given) != len(demonstrations):
@@ -135,14 +136,34 @@ def matchings_into(environment, demonstrations, given=None):
     for k, (shown, matching) in enumerate(zip(demonstrations, given, strict=True)):
         names = f"demonstration {k}", "the environment to learn in"
         try:
-            each, told = matched_to(shown.environment, environment, matching, names)
+            each, told = _common(
+                matched_to(shown.environment, environment, matching, names),
+                shown,
+                environment,
+                names,
+            )
         except ValueError as error:
             if matching is not None:
                 raise
-            each, told = None, [Note("set aside", f"demonstration {k} was set aside: {error}")]
+            each, told = (
+                None,
+                [Note("set aside", f"demonstration {k} was set aside: {error}", False)],
+            )
             refused.append(str(error))
         found.append(each)
         notes += told
     if len(refused) == len(found):
         raise ValueError("no demonstration can be learned from: " + "; ".join(refused))
     return found, notes
+
+
+def _common(matching_and_notes, shown, environment, names):
+    """A matching and its notes, if there is an object in common or there are none at all."""
+    matching, _ = matching_and_notes
+    counts = len(shown.environment), len(environment)
+    if any(counts) and not (matching.indices >= 0).any():
+        rule = "must have an object in common, or have none"
+        raise ValueError(
+            f"{' and '.join(names)} {rule}, got {counts[0]} and {counts[1]} objects of which none is the same"
+        )
+    return matching_and_notes

@@ -15,8 +15,9 @@ __all__ = ["anchors", "learn_as_paper", "members_along", "shared_law"]
 def learn_as_paper(demonstrations, matchings, environment, spread=None):
     """Law, association and model of demonstrations (Sec. V).
 
-    Each is mapped to the environment by closeness in that one demonstration; a CDHMM is estimated from all subgoals by
-    merging; its most-likely path is the task, and segments merged along an edge share one LDS.
+    Each is mapped to the environment by closeness in that one demonstration; a CDHMM is estimated
+    from all subgoals by merging; its most-likely path is the task, and segments merged along an
+    edge share one LDS.
 
     Parameters
     ----------
@@ -37,7 +38,8 @@ def learn_as_paper(demonstrations, matchings, environment, spread=None):
     Raises
     ------
     ValueError
-        An environment without objects, or a demonstration that cannot be segmented at its tolerance.
+        An environment without objects, or a demonstration that cannot be segmented at its
+        tolerance.
     """
     pairs = zip(demonstrations, matchings, strict=True)
     laws, centres = zip(*(mapped_to(environment, shown, matching) for shown, matching in pairs), strict=True)

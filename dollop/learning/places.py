@@ -1,21 +1,25 @@
 """Which object does each place of a task follow? (Sec. IV-B, from the evidence of several demonstrations.)
 
-A way is L places, one after the other. A place that follows object j has the same offset from j in every demonstration,
-and offsets metres apart from all others. So for each place l there are candidates c, sets of weights w over the frames
-(`dollop.learning.frames`): one frame alone, or a place between two objects. With X[d, l] the place in demonstration d,
+A way is L places, one after the other. A place that follows object j has the same offset from j in
+every demonstration, and offsets metres apart from all others. So for each place l there are
+candidates c, sets of weights w over the frames (`dollop.learning.frames`): one frame alone, or a
+place between two objects. With X[d, l] the place in demonstration d,
 
     local[l, F]     = mean over d of X[d, l] as seen from frame F
     error[d, l, F]  = local[l, F], back in demonstration d, - X[d, l]
     P(c | l)       ~ closeness(c) * evidence of sum_F w[c, F] error[d, l, F]
 
-The evidence is that of Normal-inverse-Wishart offsets whose mean is anywhere in the room; closeness, the paper's kind
-of weight, is the prior: of one demonstration nothing else is left. What a place follows changes seldom along the way:
-the candidates are the states of a hidden Markov chain, and P is its posterior. The weights of the frames are then
+The evidence is that of Normal-inverse-Wishart offsets whose mean is anywhere in the room;
+closeness, the paper's kind of weight, is the prior: of one demonstration nothing else is left. What
+a place follows changes seldom along the way: the candidates are the states of a hidden Markov
+chain, and P is its posterior. The weights of the frames are then
 
-    w[l] = argmin  sum_d |sum_F w_F error[d, l, F]|^2 / sigma^2 + |w - sum_c P(c | l) w[c]|^2 / tau^2,   sum_F w_F = 1,
+    w[l] = argmin  sum_d |sum_F w_F error[d, l, F]|^2 / sigma^2 + |w - sum_c P(c | l) w[c]|^2 /
+    tau^2,   sum_F w_F = 1,
 
-which learns what lies between the candidates from many demonstrations, and leaves them alone where there are few; and
-in a new environment the place is at sum_F w[l, F] (local[l, F], back there). All this is a reconstruction.
+which learns what lies between the candidates from many demonstrations, and leaves them alone where
+there are few; and in a new environment the place is at sum_F w[l, F] (local[l, F], back there). All
+this is a reconstruction.
 """
 
 from dataclasses import dataclass
@@ -66,7 +70,8 @@ class Places:
         Parameters
         ----------
         frames : Frames
-            The same F frames in D environments. The weights of those that are not there go to the others.
+            The same F frames in D environments. The weights of those that are not there go to the
+            others.
 
         Returns
         -------
@@ -86,7 +91,8 @@ def candidates(frames, told_apart):
     ----------
     frames : Frames
     told_apart : bool
-        Whether several demonstrations tell objects, world and places between them apart; else single objects only.
+        Whether several demonstrations tell objects, world and places between them apart; else
+        single objects only.
 
     Returns
     -------

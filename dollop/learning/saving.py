@@ -1,7 +1,8 @@
 """Tasks as files: JSON of this library's own format, whose numbers must not contradict each other.
 
-Version 2 of an anchored task holds the ways as they were learned, and no law: that is fitted anew, so that nothing can
-contradict it. Version 1, and a task of the paper's method, hold the law and the ties of its places to corners.
+Version 2 of an anchored task holds the ways as they were learned, and no law: that is fitted anew,
+so that nothing can contradict it. Version 1, and a task of the paper's method, hold the law and the
+ties of its places to corners.
 """
 
 import json
@@ -63,9 +64,22 @@ def _of_law(task):
 
 
 def _of_way(way):
-    names = "home", "weights", "local", "objects", "members", "covered", "sample_period", "tolerance"
+    names = (
+        "home",
+        "weights",
+        "local",
+        "objects",
+        "members",
+        "covered",
+        "sample_period",
+        "tolerance",
+    )
     content = {name: getattr(way, name) for name in names}
-    return content | {"walks": list(way.walks), "shares": list(way.shares), "turning": way.turning.astype(int)}
+    return content | {
+        "walks": list(way.walks),
+        "shares": list(way.shares),
+        "turning": way.turning.astype(int),
+    }
 
 
 def _of_demonstration(shown):
@@ -80,7 +94,11 @@ def _of_demonstration(shown):
 
 def _of_environment(environment):
     directions = [None if np.isnan(angle) else angle for angle in environment.directions]
-    content = {"boxes": environment.boxes, "directions": directions, "assumed": environment.assumed.astype(int)}
+    content = {
+        "boxes": environment.boxes,
+        "directions": directions,
+        "assumed": environment.assumed.astype(int),
+    }
     seen = environment.seen
     if seen is None:
         return content
@@ -106,7 +124,8 @@ def read_task(path, make_task, make_demonstration, laid_out):
     Raises
     ------
     FormatError
-        For a file that is damaged, not a task, of another version, or whose numbers contradict each other.
+        For a file that is damaged, not a task, of another version, or whose numbers contradict each
+        other.
     """
     try:
         content = json.loads(read_bytes(path))
@@ -129,7 +148,13 @@ def read_task(path, make_task, make_demonstration, laid_out):
 def _as_version_2(content):
     """What version 1 holds, by the names of version 2."""
     shown = [each | {"environment": {"boxes": each["boxes"]}, "notes": []} for each in content["demonstrations"]]
-    told = {"method": "paper", "environment": {"boxes": content["boxes"]}, "notes": [], "partners": [], "objects": None}
+    told = {
+        "method": "paper",
+        "environment": {"boxes": content["boxes"]},
+        "notes": [],
+        "partners": [],
+        "objects": None,
+    }
     return content | told | {"demonstrations": shown}
 
 
@@ -150,7 +175,12 @@ def _task_from(content, shown, make_task, laid_out):
     if content["method"] != "paper":
         raise ValueError(f"method must be 'anchored' or 'paper', got {content['method']!r:.40}")
     law = _law_from(content)
-    return make_task(law, environment, _association_from(content["association"], environment, anchors(law)), **known)
+    return make_task(
+        law,
+        environment,
+        _association_from(content["association"], environment, anchors(law)),
+        **known,
+    )
 
 
 def _law_from(content):
@@ -251,7 +281,7 @@ def _environment_from(content):
         directions = [np.nan if angle is None else angle for angle in directions]
     assumed, seen = content.get("assumed"), content.get("seen")
     if seen is not None:
-        floor = np.array([[cell == "1" for cell in row] for row in seen["floor"]])
+        floor = np.array([np.frombuffer(row.encode(), np.uint8) == ord("1") for row in seen["floor"]])
         if floor.ndim != 2:
             raise ValueError("the rows of what was seen must be of one length")
         origin = tuple(checked_array("origin", seen["origin"], 2).tolist())

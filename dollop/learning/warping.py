@@ -1,11 +1,13 @@
 """Laying walks onto a way, seen from the objects (beyond the paper).
 
-When objects move, places do not keep their share of the way. So a walk is laid onto the places of a way by dynamic
-time warping in which a sample and a place are alike when some frame that the place follows sees them at the same spot,
+When objects move, places do not keep their share of the way. So a walk is laid onto the places of a
+way by dynamic time warping in which a sample and a place are alike when some frame that the place
+follows sees them at the same spot,
 
     cost = min(-log sum_F w_F exp(-|offset_F - offset'_F|^2 / (4 sigma^2)), CUT) .
 
-What a walk lacks at its beginning or end, or has more than the way, is left out at a price for each place.
+What a walk lacks at its beginning or end, or has more than the way, is left out at a price for each
+place.
 """
 
 import numpy as np

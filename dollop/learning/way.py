@@ -1,7 +1,8 @@
 """One way of doing a task: places tied to objects, and the walk that they carry along (Sec. IV-B, beyond the paper).
 
-Where the objects stand elsewhere, the places do, and the walk is displaced with them; the law is what is fitted to the
-walk that results (Sec. III), so that it keeps its tolerance in every environment.
+Where the objects stand elsewhere, the places do, and the walk is displaced with them; the law is
+what is fitted to the walk that results (Sec. III), so that it keeps its tolerance in every
+environment.
 """
 
 from dataclasses import dataclass, replace
@@ -32,7 +33,8 @@ class Way:
     Attributes
     ----------
     walks : tuple of (N_k, 2) float arrays
-        What was shown, in m: of one demonstration its own walks, of several their mean, at the pace of all.
+        What was shown, in m: of one demonstration its own walks, of several their mean, at the pace
+        of all.
     shares : tuple of (N_k,) float arrays
         Where along the places each sample of a walk is, from 0 to L - 1.
     home : (L, 2) float array

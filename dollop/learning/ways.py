@@ -1,9 +1,10 @@
 """The ways in which a task was shown, each from demonstrations among objects that stood elsewhere (Sec. V and beyond).
 
-Walks of one way are laid onto the places of one of them, what the places follow is told from all (`dollop.learning.
-places`), and the walks are laid onto the places again, by turns. Where a walk then misses the way for a while by more
-than walks do, it is no walk of this way: the demonstrations are divided by the two that are least alike, and each part
-is learned by itself. A walk that lacks the beginning or the end of the way adds to what it covers.
+Walks of one way are laid onto the places of one of them, what the places follow is told from all
+(`dollop.learning. places`), and the walks are laid onto the places again, by turns. Where a walk
+then misses the way for a while by more than walks do, it is no walk of this way: the demonstrations
+are divided by the two that are least alike, and each part is learned by itself. A walk that lacks
+the beginning or the end of the way adds to what it covers.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import numpy as np
 from dollop.learning.places import Places, tied_places
 from dollop.learning.warping import alikeness, warped
 
-__all__ = ["PLACES", "Laid", "divided", "laid_together"]
+__all__ = ["MISSED", "PLACES", "Laid", "divided", "laid_together"]
 
 PLACES = 80
 """Of a way: about one every 0.15 m of a walk through a room."""
@@ -75,7 +76,8 @@ def laid_together(curves, frames, references=REFERENCES):
     frames : Frames
         Of the D demonstrations.
     references : int
-        From how many of the walks to begin, the longest first; the way that is most like all walks is kept.
+        From how many of the walks to begin, the longest first; the way that is most like all walks
+        is kept.
 
     Returns
     -------

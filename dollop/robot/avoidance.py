@@ -151,7 +151,11 @@ class ObstacleMap:
         c, d = lookup[corner + columns], lookup[corner + columns + 1]
         lower, upper = a + right * (b - a), c + right * (d - c)
         slope_x = ((b - a) * (1 - top) + (d - c) * top) / self.resolution
-        return lower + top * (upper - lower) - self.radius, slope_x, (upper - lower) / self.resolution
+        return (
+            lower + top * (upper - lower) - self.radius,
+            slope_x,
+            (upper - lower) / self.resolution,
+        )
 
     def cuts_corner(self, x, y, ahead_x, ahead_y):
         """Whether half-way to another place, straight on, the robot has next to no room.

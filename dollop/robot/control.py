@@ -29,7 +29,16 @@ from dollop.law.line import Fading
 from dollop.pose import wrapped
 from dollop.robot.avoidance import Geodesic, towards
 
-__all__ = ["CONTROL_LAWS", "PATIENCE", "PIONEER_LIMITS", "REACH", "STEP", "Guidance", "Limits", "clip"]
+__all__ = [
+    "CONTROL_LAWS",
+    "PATIENCE",
+    "PIONEER_LIMITS",
+    "REACH",
+    "STEP",
+    "Guidance",
+    "Limits",
+    "clip",
+]
 
 REACH = 0.25
 """Distance in m from its subgoal at which a segment hands over: a robot that needs 0.6 m to turn
