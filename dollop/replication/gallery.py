@@ -34,6 +34,7 @@ NAMES = {
     "indices": ("goes to corner", ""),
     "cost": ("cost", ""),
     "margin": ("margin to the second best", ""),
+    "probability": ("probability of the matching", ""),
     "matching_right": ("layouts matched right", ""),
     "layouts": ("layouts", ""),
     "states_before": ("states before merging", ""),

@@ -504,7 +504,7 @@ def slalom_runs(control="pursuit", avoid=True, count=10):
 # ---- what laws and runs are judged by
 
 
-def largest_corner(law, over=0.1):
+def largest_corner(law, over=0.1, method="held"):
     """The largest angle by which a law's response turns where a segment hands over to the next.
 
     Parameters
@@ -512,16 +512,18 @@ def largest_corner(law, over=0.1):
     law : SequencedLDS
     over : float
         In m.
+    method : {"held", "paper"}
+        Which response.
 
     Returns
     -------
     float
         In rad; 0 for a single segment.
     """
-    return float(hand_over_turns(law, over).max(initial=0))
+    return float(hand_over_turns(law, over, method).max(initial=0))
 
 
-def hand_over_turns(law, over=0.1):
+def hand_over_turns(law, over=0.1, method="held"):
     """The angles by which a law's response turns where a segment hands over to the next.
 
     Each is the angle between the ways to the place of the handing over and on from it, each so many
@@ -534,13 +536,15 @@ def hand_over_turns(law, over=0.1):
         Of K segments.
     over : float
         In m.
+    method : {"held", "paper"}
+        Which response.
 
     Returns
     -------
     (K - 1,) float array
         In rad.
     """
-    response = law.response()
+    response = law.response(method=method)
     place = arc_length(response)[_hand_overs(law, response)]
     before, here, after = (at_arc_length(response, place + shift) for shift in (-over, 0, over))
     arriving, going_on = (here - before) @ (1, 1j), (after - here) @ (1, 1j)

@@ -2,7 +2,7 @@
 
 from functools import cache, lru_cache
 from itertools import permutations
-from math import inf, nan
+from math import inf
 from timeit import repeat
 
 import numpy as np

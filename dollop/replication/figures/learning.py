@@ -7,7 +7,14 @@ from scipy.stats import binomtest
 
 from dollop import plot
 from dollop.replication import baseline, drawing, recordings
-from dollop.replication.figures.controls import COLUMNS, CONTROLS, by_kind, draw_runs, numbers
+from dollop.replication.figures.controls import (
+    COLUMNS,
+    CONTROLS,
+    RESPONSES,
+    by_kind,
+    draw_runs,
+    numbers,
+)
 from dollop.replication.figures.panel import panel
 from dollop.replication.figures.performing import law_numbers
 
@@ -135,10 +142,11 @@ def draw_demonstration(k):
 def figure_12a():
     """The CDHMM estimated from the demonstrations of Figure 11, with the most-likely path.
 
-    Both demonstrations were mapped to the first one's environment (dots and triangles); then states
-    that the evidence cannot tell apart were merged. An ellipse is two standard deviations of where
-    a state's subgoal is expected. With two demonstrations that is nearly all prior: the model
-    starts from the spread below, and the two subgoals of a state change it little.
+    Both demonstrations were mapped to the first one's environment (dots and triangles), each subgoal
+    by the objects that its place follows; then states that the evidence cannot tell apart were
+    merged. An ellipse is two standard deviations of where a state's subgoal is expected. With two
+    demonstrations that is nearly all prior: the model starts from the spread below, which all
+    subgoals together tell, and the two of a state change it little.
     """
     task = recordings.slalom_task()
     figure, ax = plt.subplots(figsize=SIZE)
@@ -171,7 +179,7 @@ def figure_12b():
     task, runs_of = recordings.new_slalom_task(), by_kind(recordings.slalom_runs)
     figure, axes = plt.subplots(2, 1, figsize=(8, 6.4), sharex=True)
     for ax, (kind, (title, _)) in zip(axes, CONTROLS.items(), strict=True):
-        draw_runs(ax, task, runs_of[kind], title)
+        draw_runs(ax, task, runs_of[kind], title, RESPONSES[kind])
         plot.subgoals(ax, task.law.subgoals)
         ax.set(xlim=(0.6, 8.4), ylim=(2.2, 4.8))
     axes[0].set_xlabel("")
