@@ -44,6 +44,7 @@ NAMES = {
     "mean_sd_m": ("standard deviation of a state, mean", "m"),
     "passed_on_the_demonstrated_side": ("runs that pass every cone on the demonstrated side", ""),
     **{f"{n}_objects": (f"{n} objects, sizes off by 5 cm: share right", "") for n in (2, 3, 4)},
+    **{f"{n}_objects_told": (f"{n} objects: mean probability told", "") for n in (2, 3, 4)},
     "cans_seen": ("2 cans seen by the laser: share right", ""),
     "cones_seen": ("4 cones seen by the laser: share right", ""),
     "seeds": ("seeds", ""),

@@ -34,7 +34,8 @@ def matching_shares(
         One row per combination and method: change, objects, noise (m), method, right (share of
         layouts with all corners right), right_objects (with all objects right, whichever their
         corners), confident (share reported so), right_if_confident (share of these with all objects
-        right), layouts. The literal method, being a bijection, has no rows where the count changes.
+        right), probability (mean of what is told, nan of the literal method), layouts. The literal
+        method, being a bijection, has no rows where the count changes.
     """
     rows = []
     for change, n, noise in product(changes, objects, noises):
@@ -53,10 +54,12 @@ def _shares(layouts, method, turn):
     found = np.array([matching.indices for matching in matchings])
     right_objects = (found // 4 == truths // 4).all(axis=1)
     confident = np.array([matching.confident for matching in matchings])
+    told = np.array([matching.probability for matching in matchings])
     return {
         "right": (found == truths).all(axis=1).mean(),
         "right_objects": right_objects.mean(),
         "confident": confident.mean(),
         "right_if_confident": right_objects[confident].mean() if confident.any() else np.nan,
+        "probability": told.mean(),
         "layouts": len(layouts),
     }

@@ -196,7 +196,8 @@ def figure_x1():
     """Beyond the paper: how matching fares when box sizes are uncertain.
 
     Left, objects drawn at random, each moved, and seen with box sizes off by up to so much; the
-    numbers are at 5 cm. The literal cost loses its way as soon as boxes are not exact. Right, cans
+    numbers are at 5 cm, and beside the share right stands the mean probability that the robust
+    matching tells. The literal cost loses its way as soon as boxes are not exact. Right, cans
     and cones that the simulated laser sees, each layout matched to the first: a laser sees one side
     of a can and is off by some centimetres.
     """
@@ -207,6 +208,8 @@ def figure_x1():
     draw_shares_seen(right, dict(zip(("2 cans", "4 cones"), seen, strict=True)))
     known = shares[shares.noise == 0.05]
     measured = {f"{row.method}_{row.objects}_objects": row.right for row in known.itertuples()}
+    for row in known[known.method == "robust"].itertuples():
+        measured[f"robust_{row.objects}_objects_told"] = row.probability
     for kind, share in zip(("cans", "cones"), seen, strict=True):
         measured |= {f"{method}_{kind}_seen": right for method, right in share.items()}
     return figure, measured

@@ -170,11 +170,11 @@ def figure_12b():
     """The result after mapping the subgoals to a new environment.
 
     Nobody ever walked among these cones; the fan is the starts of ten runs, the same above and
-    below. Above the paper's kind of control: the plain law, which knows of no obstacle. It touches
-    a cone, backs off and gets round it: past the third cone the law leaves less room than the robot
-    needs, for a law is a line, and moved subgoals do not keep every distance. Below Dollop's own:
-    it goes round what is in the way, and that alone is why nothing is touched. The circles are the
-    robot where it first touches something.
+    below. Both times the law is what two demonstrations together tell of which cone each of its
+    places follows. Above the paper's kind of control: the plain law, which knows of no obstacle and
+    comes as near to the cones as the law does. Below Dollop's own, which goes round what is near:
+    between two cones it keeps to the middle and leaves the law. The largest corner is where the
+    user turned as sharply. A circle, if there is one, is the robot where it first touches something.
     """
     task, runs_of = recordings.new_slalom_task(), by_kind(recordings.slalom_runs)
     figure, axes = plt.subplots(2, 1, figsize=(8, 6.4), sharex=True)

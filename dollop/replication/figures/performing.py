@@ -24,7 +24,7 @@ SIZE = (6, 5.2)
 PAIR = (10, 4.7)
 
 
-@panel("6b", own="Dollop's own response", paper="every LDS alone")
+@panel("6b", held="Dollop's own response", paper="every LDS alone")
 def figure_6b():
     """The subgoals and control law extracted from the demonstrations.
 
