@@ -312,7 +312,7 @@ def test_a_last_lap_that_ends_early_is_left_out_and_named():
     (note,) = shown.notes
     assert len(shown.walks) == 4 and len(cut_laps(user.t, path).laps) == 5
     assert (note.kind, note.doubt) == ("laps", False) and "[4] are left out" in note.text
-    np.testing.assert_allclose(shown.law.subgoals[-1], lap[0], atol=0.05)
+    np.testing.assert_allclose(shown.law.subgoals[-1], shown.walks[0][0], atol=0.05)
 
 
 def test_a_task_tells_what_its_demonstrations_told(tmp_path):
