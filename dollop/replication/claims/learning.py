@@ -32,6 +32,9 @@ RESPONSES = {"paper": "paper", "anchored": "held"}
 SPREAD = 0.15
 """Standard deviation in m of a subgoal along each axis, which merging expects."""
 
+SPREADS = {"paper": SPREAD, "anchored": None}
+"""The spread that each method of learning is told: to estimate it is beyond the paper."""
+
 
 # ---- subgoals of a known task
 
@@ -158,7 +161,7 @@ def slaloms(seed, method="paper"):
     *walked, third = (recordings.slalom(k, seed) for k in range(3))
     shown, kept = [each.demonstration for each in walked], third.demonstration
     try:
-        both = learn(shown, method=method).adapt(kept.environment)
+        both = learn(shown, method=method, spread=SPREADS[method]).adapt(kept.environment)
         alone = [Task.of(each, method).adapt(kept.environment) for each in shown]
     except ValueError:  # an ambiguous matching: it asks instead of guessing
         return None
