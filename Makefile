@@ -52,12 +52,14 @@ clean:  ## remove .venv and caches; figures and recordings stay
 	rm -rf .venv build *.egg-info .pytest_cache .hypothesis .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
+# movement_primitives comes as source. Built where there is no Cython it is pure Python, and needs no compiler.
 .venv/ready: environment.txt pyproject.toml
 	@test -n "$(PYTHON)" || { echo "Dollop needs Python 3.11, and none was found." >&2; \
 	  echo "Get one: 'apt install python3.11 python3.11-venv', 'brew install python@3.11', 'pyenv install 3.11'," >&2; \
 	  echo "or from python.org; then run make again, or name it: make PYTHON=/path/to/python3.11 ..." >&2; exit 1; }
 	rm -rf .venv
 	"$(PYTHON)" -m venv .venv || { echo "Python's venv module is missing: 'apt install python3.11-venv' on Debian and Ubuntu." >&2; exit 1; }
-	$(RUN) -m pip install --quiet --disable-pip-version-check -r environment.txt
+	$(RUN) -m pip install --quiet --disable-pip-version-check $$(grep -E '^(setuptools|wheel)==' environment.txt)
+	$(RUN) -m pip install --quiet --disable-pip-version-check --no-build-isolation -r environment.txt
 	$(RUN) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@

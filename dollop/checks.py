@@ -227,8 +227,18 @@ def put_in(record, **fields):
         object.__setattr__(record, name, value)
 
 
-EXTRAS = {"lab": "pybullet", "ros": "rosbags", "baseline": "hmmlearn", "cluster": "distributed"}
+EXTRAS = {
+    "lab": "pybullet",
+    "ros": "rosbags",
+    "baseline": "hmmlearn",
+    "peers": "movement_primitives",
+    "cluster": "distributed",
+}
 """The module by which each extra of pyproject.toml that the code asks for is known to be there."""
+_HINTS = {
+    "lab": " (wheels only for Linux x86-64 and CPython up to 3.11)",
+    "peers": " (built from source, with a C compiler)",
+}
 
 
 def need(extra):
@@ -250,12 +260,11 @@ def need(extra):
     --------
     >>> need("laboratory")
     Traceback (most recent call last):
-    ValueError: extra must be one of 'lab', 'ros', 'baseline', 'cluster', got 'laboratory'
+    ValueError: extra must be one of 'lab', 'ros', 'baseline', 'peers', 'cluster', got 'laboratory'
     """
     check_choice("extra", extra, EXTRAS)
     if find_spec(EXTRAS[extra]) is None:
-        wheels = " (wheels only for Linux x86-64 and CPython up to 3.11)" if extra == "lab" else ""
-        raise ImportError(f'this needs {EXTRAS[extra]}: pip install "dollop[{extra}]"{wheels}')
+        raise ImportError(f'this needs {EXTRAS[extra]}: pip install "dollop[{extra}]"{_HINTS.get(extra, "")}')
 
 
 @dataclass(frozen=True)

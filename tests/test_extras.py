@@ -19,6 +19,7 @@ def test_what_is_missing_is_told_with_the_line_that_installs_it(extra, monkeypat
     with pytest.raises(ImportError, match=line) as caught:
         need(extra)
     assert ("wheels only for Linux" in str(caught.value)) == (extra == "lab")
+    assert ("with a C compiler" in str(caught.value)) == (extra == "peers")
 
 
 def test_what_is_there_passes(monkeypatch):

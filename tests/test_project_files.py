@@ -19,6 +19,7 @@ PLACES = {  # where an extra may be imported
     "lab": "dollop/lab/engine.py",
     "ros": "dollop/formats/ros_bag.py",
     "baseline": "dollop/replication/baseline.py",
+    "peers": "dollop/replication/peers.py",
     "cluster": "dollop/replication/running.py",
 }
 LOCK = (ROOT / "environment.txt").read_text().splitlines()

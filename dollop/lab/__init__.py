@@ -30,6 +30,7 @@ HOMES = {
     "scanner": ["Scanner", "SickLMS200", "SickTiM571", "UTM30LX"],
     "scenes": ["Scene", "empty_scene", "figure_eight_scene", "moved", "rearranged", "slalom_scene"],
     "simulate": ["record", "record_background", "record_figure_eights", "record_tour", "watch"],
+    "tasks": ["DrawnTask", "draw_layouts", "draw_task", "walked"],
     "things": ["Move", "Object", "Person", "Robot"],
     "world": ["World"],
 }  # fmt: skip

@@ -12,12 +12,13 @@ place.
 
 import numpy as np
 
-__all__ = ["alikeness", "warped"]
+__all__ = ["CUT", "alikeness", "warped"]
 
 SPREAD, CUT = 0.15, 8.0
 """m and nats: how far walks miss the same place; and from where on farther is no less alike."""
-SKIPPED = 5.0
-"""Nats: what it costs that a place at either end has no sample, or a sample no place."""
+SKIPPED, BEYOND = 3.0, 8.0
+"""Nats: what it costs that a place at either end has no sample, for a walk may be cut short; and
+that a sample has no place, for the way should hold all that was shown."""
 FEWEST = 1e-2
 """Share: a frame that a place follows less than that says nothing of it."""
 
@@ -55,15 +56,15 @@ def alikeness(posterior, candidates, local, frames, points):
     return np.minimum(-np.log(np.maximum(likelihood, 1e-300)), CUT)
 
 
-def warped(cost, skipped=SKIPPED):
+def warped(cost, skipped=SKIPPED, beyond=BEYOND):
     """The cheapest monotone way through each matrix of costs, its ends left out where that is cheaper.
 
     Parameters
     ----------
     cost : (D, L, M) float array
         Of walk d's sample m at place l, in nats.
-    skipped : float
-        Of leaving out a place or a sample at either end, in nats.
+    skipped, beyond : float
+        Of leaving out a place, and a sample, at either end, in nats.
 
     Returns
     -------
@@ -76,21 +77,21 @@ def warped(cost, skipped=SKIPPED):
     beyond : (D,) float array
         How many of a walk's samples are left out at its ends.
     """
-    results = [_warped(each, skipped) for each in cost]
+    results = [_warped(each, skipped, beyond) for each in cost]
     return tuple(map(np.array, zip(*results, strict=True)))
 
 
-def _warped(cost, skipped):
+def _warped(cost, skipped, price):
     places, samples = cost.shape
     total = np.empty((places + 1, samples + 1))
-    total[0], total[:, 0] = skipped * np.arange(samples + 1), skipped * np.arange(places + 1)
+    total[0], total[:, 0] = price * np.arange(samples + 1), skipped * np.arange(places + 1)
     for place in range(1, places + 1):
         sums = np.concatenate([[0.0], cost[place - 1]]).cumsum()
         best = np.minimum(total[place - 1, 1:], total[place - 1, :-1])
         best = np.concatenate([[total[place, 0]], best + cost[place - 1]])
         total[place] = np.minimum.accumulate(best - sums) + sums
     end_place = total[:, -1] + skipped * np.arange(places, -1, -1)
-    end_sample = total[-1] + skipped * np.arange(samples, -1, -1)
+    end_sample = total[-1] + price * np.arange(samples, -1, -1)
     if end_place.min() <= end_sample.min():
         place, sample = int(end_place.argmin()), samples
     else:

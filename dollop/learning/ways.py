@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from dollop.learning.places import Places, tied_places
-from dollop.learning.warping import alikeness, warped
+from dollop.learning.warping import CUT, alikeness, warped
 
 __all__ = ["MISSED", "PLACES", "Laid", "divided", "laid_together"]
 
 PLACES = 80
 """Of a way: about one every 0.15 m of a walk through a room."""
-ROUNDS, REFERENCES = 4, 3
+ROUNDS, REFERENCES = 4, 5
 """Times that walks are laid onto the way, and from how many of them it begins."""
 PULL = 5.0
 """Nats: how much less alike a place and a sample are that lie a whole way apart."""
@@ -104,7 +104,8 @@ def _laid_onto(curves, frames, reference):
         places = tied_places(points, covered, frames)
         local = _by_others(points, covered, frames)
     missed = most_missed(places.among(frames), points, covered)
-    return Laid(places, points, covered, at, beyond / PLACES, missed, float(cost.sum()))
+    unlike = float(cost.sum() + CUT * beyond.sum())  # the way should hold all that was shown
+    return Laid(places, points, covered, at, beyond / PLACES, missed, unlike)
 
 
 def _sampled(curves, at):

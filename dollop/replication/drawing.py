@@ -18,9 +18,14 @@ METHODS = {
     "plain mean": "#5F6B73",
     "HMM, BIC": "#661100",  # browns: the two hidden Markov models
     "left-to-right HMM, BIC": "#BF8B5E",
+    "anchored": "#332288",  # ways of learning: Dollop's default, the paper's ...
+    "paper": "#999933",
+    "TP-GMM": "#661100",  # ... and other people's
+    "ProMP": "#BF8B5E",
+    "DMP": "#5F6B73",
 }
-"""Colours of the methods that are compared, by their names in `dollop.match` and
-`dollop.replication.baseline`.
+"""Colours of the methods that are compared, by their names in `dollop.match`,
+`dollop.learn`, `dollop.replication.baseline` and `dollop.replication.peers`.
 """
 
 

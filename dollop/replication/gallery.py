@@ -50,6 +50,15 @@ NAMES = {
     "seeds": ("seeds", ""),
     **{f"right_{n}": (f"{n} demonstrations: share right", "") for n in (2, 5, 10)},
     **{f"error_m_{n}": (f"{n} demonstrations: mean error", "m") for n in (2, 5, 10)},
+    "tasks": ("tasks", ""),
+    **{
+        f"error_percent_{n}": (
+            f"{n} demonstration{'s' * (n > 1)}: median error, of the task's size",
+            "%",
+        )
+        for n in (1, 2, 3, 5, 10)
+    },
+    "error_percent": ("median error, of the task's size", "%"),
     "exponent": ("error falls with the number to the power of", ""),
     "error_by_expected": ("error, as a share of the expected one", ""),
 }

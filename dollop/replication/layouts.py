@@ -13,7 +13,12 @@ __all__ = ["matching_shares"]
 
 
 def matching_shares(
-    objects=(2, 3, 4), noises=(0.0, 0.05, 0.1, 0.2), changes=("none",), layouts=300, seed=0, **properties
+    objects=(2, 3, 4),
+    noises=(0.0, 0.05, 0.1, 0.2),
+    changes=("none",),
+    layouts=300,
+    seed=0,
+    **properties,
 ):
     """How often the corners are matched right, by method, number and box noise (Fig. x1).
 

@@ -10,7 +10,8 @@ from places import ROOT
 import dollop
 from dollop import figures as door
 from dollop.checks import EXTRAS
-from dollop.replication import baseline, figures, recordings
+from dollop.replication import baseline, figures, peers, recordings
+from dollop.replication.figures import moved
 from dollop.replication.figures.controls import CONTROLS, RESPONSES, numbers
 from dollop.replication.figures.performing import law_numbers
 from dollop.replication.layouts import matching_shares
@@ -112,6 +113,15 @@ def test_learning_is_in_its_bands():
     assert shares["hmm_seeds"] == shares["left_to_right_seeds"] >= 12
 
 
+def test_learning_among_moved_objects_is_in_its_bands():
+    """Fig. x3: from two demonstrations on ours is nearer than any other; with ten nearer than with one."""
+    errors, others = COMMITTED["x3"], ("paper", "tp_gmm", "promp", "dmp")
+    for n in (2, 3, 5, 10):
+        assert errors[f"anchored_error_percent_{n}"] < min(errors[f"{name}_error_percent_{n}"] for name in others)
+    assert errors["anchored_error_percent_10"] < 0.5 * errors["anchored_error_percent_1"]
+    assert errors["walked_again_error_percent"] < 1 and errors["tasks"] >= 12
+
+
 def test_the_notebooks_tell_the_error_of_figure_6b():
     """What notebooks 00 and 04 measure on data/ is the figure's number, by the same definition."""
     log = dollop.read_log(ROOT / "data" / "figure_eights.log.gz")
@@ -160,12 +170,12 @@ def test_unknown_figures_are_named_with_the_known_ones(capsys):
     assert "no figure 99; known: 1, 2" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("extra", ["lab", "baseline"])
+@pytest.mark.parametrize("extra", ["lab", "baseline", "peers"])
 def test_without_an_extra_the_figures_say_how_to_get_it(extra, tmp_path, monkeypatch):
     """The error names the extra that any of the figures lacks, before the first is drawn."""
     monkeypatch.setattr("dollop.checks.find_spec", lambda name: None if name == EXTRAS[extra] else "found")
     with pytest.raises(ImportError, match=rf"pip install .dollop\[{extra}\]"):
-        figures.main(["2", "x2", "--folder", str(tmp_path)])
+        figures.main(["2", "x2", "x3", "--folder", str(tmp_path)])
     assert list(tmp_path.iterdir()) == []
 
 
@@ -239,6 +249,17 @@ def test_fresh_demonstrations_are_merged_as_well_as_in_figure_x2():
         assert mean.right_order == pytest.approx(COMMITTED["x2"][f"mean_right_{n}"], abs=0.34)
     one = baseline.study(("slalom",), (2,), (0.15,), (0,), {"HMM, BIC": baseline.gaussian_hmm})
     assert COMMITTED["x2"]["hmm_right_2"] == pytest.approx(one.right_order.mean(), abs=0.67)
+
+
+def test_fresh_tasks_are_learned_as_well_as_in_figure_x3():
+    """From two demonstrations, the same tasks: ours and a ProMP within a tenth of the committed medians."""
+    pytest.importorskip("movement_primitives", reason="ProMP needs the extra peers")
+    methods = {name: peers.METHODS[name] for name in ("anchored", "ProMP")}
+    seeds = range(moved.FIRST, moved.FIRST + moved.TASKS)
+    medians = peers.summary(peers.study(numbers=(2,), seeds=seeds, methods=methods))["median"]
+    for method, name in (("anchored", "anchored"), ("ProMP", "promp")):
+        found = medians["anywhere", moved.OBJECTS, method, 2]
+        assert found == pytest.approx(COMMITTED["x3"][f"{name}_error_percent_2"], rel=0.1)
 
 
 def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):

@@ -70,7 +70,7 @@ def test_a_number_is_written_with_its_unit(value, unit, expected):
 
 def test_every_number_has_words_and_the_unit_that_its_name_ends_in():
     """No key of metrics.json is without words, or in a unit that is not what it says."""
-    units = {"m": "m", "s": "s", "deg": "°"}
+    units = {"m": "m", "s": "s", "deg": "°", "percent": "%"}
     for panel, numbers in METRICS.items():
         for key in numbers:
             name = gallery.name_of(key, FIGURES[panel].columns)

@@ -239,7 +239,10 @@ def single(seed):
     task, ours = recordings.figure_eights(seed).task_as_paper, recordings.figure_eights(seed).task
     try:
         found = task.adapt(now)
-        adapted, adapted_ours = error_of(found.law, walks), error_of(ours.adapt(now).law, walks, "held")
+        adapted, adapted_ours = (
+            error_of(found.law, walks),
+            error_of(ours.adapt(now).law, walks, "held"),
+        )
     except ValueError:  # an ambiguous matching: it asks instead of guessing
         return unknown("single")
     known = found.objects >= 0

@@ -17,7 +17,7 @@ from dollop import plot
 from dollop.checks import need
 from dollop.formats.files import FormatError, check_writable, whole_file
 from dollop.replication import gallery
-from dollop.replication.figures import environment, learning, observing, performing  # noqa: F401
+from dollop.replication.figures import environment, learning, moved, observing, performing  # noqa: F401
 from dollop.replication.figures.panel import PANELS
 
 __all__ = ["FIGURES", "main", "make"]

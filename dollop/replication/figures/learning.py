@@ -82,7 +82,11 @@ def draw_shares(ax, method, rows, shift):
     counted = right.itertuples(index=False)
     ends = np.transpose([binomtest(k, n).proportion_ci(method="wilson") for k, n in counted])
     reach = np.maximum([share - ends[0], ends[1] - share], 0)
-    look = {"color": drawing.METHODS[method], "marker": marker, "label": f"{method} ({seeds} seeds)"}
+    look = {
+        "color": drawing.METHODS[method],
+        "marker": marker,
+        "label": f"{method} ({seeds} seeds)",
+    }
     ax.errorbar(share.index + shift, share, reach, **look)
 
 

@@ -57,7 +57,11 @@ def response_numbers(law, laps, method):
     response = law.response(method=method)
     away = [distance_to_polyline(walk, response).mean() for walk in (mean_trajectory(laps), *laps)]
     corner = np.degrees(recordings.largest_corner(law, method=method))
-    return {"mean_error_m": away[0], "mean_error_laps_m": np.mean(away[1:]), "largest_corner_deg": corner}
+    return {
+        "mean_error_m": away[0],
+        "mean_error_laps_m": np.mean(away[1:]),
+        "largest_corner_deg": corner,
+    }
 
 
 def law_numbers(law, walks):

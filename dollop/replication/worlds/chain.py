@@ -227,7 +227,10 @@ def judge_observed(world, judgement):
     found = zip(judgement.results["observations"], judgement.results["recordings"], strict=True)
     for each, recording in found:
         if each.user is None:
-            judgement.refused = "observe", f"nobody moved: {len(each.tracks)} tracks, none is the user"
+            judgement.refused = (
+                "observe",
+                f"nobody moved: {len(each.tracks)} tracks, none is the user",
+            )
             return
         judge_user(each.user, recording.truth, judgement)
         judge_objects(each.environment, recording, judgement)
