@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from dollop.association import Association, associate, layout_turn
-from dollop.checks import check_choice, put_in
+from dollop.checks import Note, check_choice, put_in
 from dollop.environment import Environment
 from dollop.formats.files import whole_file
 from dollop.laps import cut_laps
@@ -17,7 +17,7 @@ from dollop.learning.paper import anchors, learn_as_paper
 from dollop.learning.saving import as_dict, read_task
 from dollop.matching import Matching
 from dollop.sequenced_lds import SequencedLDS
-from dollop.trajectory import check_trajectories
+from dollop.trajectory import check_trajectories, ways_apart
 
 __all__ = ["Demonstration", "Task", "learn"]
 
@@ -72,8 +72,9 @@ class Demonstration:
         Returns
         -------
         Demonstration
-            Of the user's laps, or of the whole walk if it holds less than two (see `cut_laps`). It
-            carries the observation's notes, and one more where much of the way is in no lap.
+            Of the user's laps, or of the whole walk if it holds less than two (see `cut_laps`). Laps
+            that are not of the way of most are left out. It carries the observation's notes, and
+            more where much of the way is in no lap, or a lap is left out.
 
         Raises
         ------
@@ -84,8 +85,9 @@ class Demonstration:
             raise ValueError("a demonstration needs a user, but nobody moved")
         t, positions = observation.user.t, observation.user.positions
         cut, period = cut_laps(t, positions), float(np.median(np.diff(t)))
-        notes = (*getattr(observation, "notes", ()), *cut.notes)
-        return cls(cut.laps, observation.environment, period, tolerance, notes)
+        walks, told = _of_one_way(cut.laps)
+        notes = (*getattr(observation, "notes", ()), *cut.notes, *told)
+        return cls(walks, observation.environment, period, tolerance, notes)
 
     @cached_property
     def walks(self):
@@ -96,6 +98,19 @@ class Demonstration:
     def law(self):
         """Sequenced LDS of the walk (Sec. III)."""
         return SequencedLDS.fit(self.trajectory, self.tolerance, sample_period=self.sample_period)
+
+
+def _of_one_way(laps):
+    """The laps of the way that most of them go, and a note of those that do not: a last one may end early."""
+    way, allowed, apart = ways_apart(laps)
+    strays = np.flatnonzero(way)
+    if not len(strays):
+        return laps, ()
+    gap = apart[strays][:, way == 0].min(axis=1).max()
+    rule = f"{gap:.2f} m from the nearest of the others, more than {allowed:.2f} m"
+    text = f"of {len(laps)} laps, counted from 0, {strays.tolist()} are left out: up to {rule}"
+    note = Note("laps", text, doubt=2 * len(strays) >= len(laps))
+    return [lap for lap, k in zip(laps, way, strict=True) if k == 0], (note,)
 
 
 @dataclass(frozen=True, eq=False)

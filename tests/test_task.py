@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from dollop import Demonstration, Environment, FormatError, Matching, Task, learn, match
 from dollop.checks import Note
+from dollop.laps import cut_laps
 from dollop.learning.paper import anchors, members_along
 
 CANS = np.array([[2.3, 3.4, 2.7, 3.8], [6.3, 3.4, 6.7, 3.8]])
@@ -299,6 +300,19 @@ def test_a_demonstration_tells_what_was_dropped(notes):
     *before, last = Demonstration.of(observed(2.5, notes)).notes
     assert tuple(before) == carried
     assert (last.kind, last.doubt) == ("laps", True) and "20%" in last.text
+
+
+def test_a_last_lap_that_ends_early_is_left_out_and_named():
+    """As long as the others, but wider, it ends before them: the law is that of the others alone."""
+    lap = eight()
+    wider = lap[0] + 1.07 * (lap - lap[0])
+    path = np.vstack([np.tile(lap[:-1], (4, 1)), wider])[:-6]
+    user = SimpleNamespace(t=0.1 * np.arange(len(path)), positions=path)
+    shown = Demonstration.of(SimpleNamespace(user=user, environment=Environment(CANS)))
+    (note,) = shown.notes
+    assert len(shown.walks) == 4 and len(cut_laps(user.t, path).laps) == 5
+    assert (note.kind, note.doubt) == ("laps", False) and "[4] are left out" in note.text
+    np.testing.assert_allclose(shown.law.subgoals[-1], shown.walks[0][0], atol=0.05)
 
 
 def test_a_task_tells_what_its_demonstrations_told(tmp_path):

@@ -34,6 +34,7 @@ NAMES = {
     "indices": ("goes to corner", ""),
     "cost": ("cost", ""),
     "margin": ("margin to the second best", ""),
+    "probability": ("probability of the matching", ""),
     "matching_right": ("layouts matched right", ""),
     "layouts": ("layouts", ""),
     "states_before": ("states before merging", ""),
@@ -43,6 +44,7 @@ NAMES = {
     "mean_sd_m": ("standard deviation of a state, mean", "m"),
     "passed_on_the_demonstrated_side": ("runs that pass every cone on the demonstrated side", ""),
     **{f"{n}_objects": (f"{n} objects, sizes off by 5 cm: share right", "") for n in (2, 3, 4)},
+    **{f"{n}_objects_told": (f"{n} objects: mean probability told", "") for n in (2, 3, 4)},
     "cans_seen": ("2 cans seen by the laser: share right", ""),
     "cones_seen": ("4 cones seen by the laser: share right", ""),
     "seeds": ("seeds", ""),
@@ -50,7 +52,10 @@ NAMES = {
     **{f"error_m_{n}": (f"{n} demonstrations: mean error", "m") for n in (2, 5, 10)},
     "tasks": ("tasks", ""),
     **{
-        f"error_percent_{n}": (f"{n} demonstration{'s' * (n > 1)}: median error, of the task's size", "%")
+        f"error_percent_{n}": (
+            f"{n} demonstration{'s' * (n > 1)}: median error, of the task's size",
+            "%",
+        )
         for n in (1, 2, 3, 5, 10)
     },
     "error_percent": ("median error, of the task's size", "%"),

@@ -13,7 +13,12 @@ __all__ = ["matching_shares"]
 
 
 def matching_shares(
-    objects=(2, 3, 4), noises=(0.0, 0.05, 0.1, 0.2), changes=("none",), layouts=300, seed=0, **properties
+    objects=(2, 3, 4),
+    noises=(0.0, 0.05, 0.1, 0.2),
+    changes=("none",),
+    layouts=300,
+    seed=0,
+    **properties,
 ):
     """How often the corners are matched right, by method, number and box noise (Fig. x1).
 
@@ -34,7 +39,8 @@ def matching_shares(
         One row per combination and method: change, objects, noise (m), method, right (share of
         layouts with all corners right), right_objects (with all objects right, whichever their
         corners), confident (share reported so), right_if_confident (share of these with all objects
-        right), layouts. The literal method, being a bijection, has no rows where the count changes.
+        right), probability (mean of what is told, nan of the literal method), layouts. The literal
+        method, being a bijection, has no rows where the count changes.
     """
     rows = []
     for change, n, noise in product(changes, objects, noises):
@@ -53,10 +59,12 @@ def _shares(layouts, method, turn):
     found = np.array([matching.indices for matching in matchings])
     right_objects = (found // 4 == truths // 4).all(axis=1)
     confident = np.array([matching.confident for matching in matchings])
+    told = np.array([matching.probability for matching in matchings])
     return {
         "right": (found == truths).all(axis=1).mean(),
         "right_objects": right_objects.mean(),
         "confident": confident.mean(),
         "right_if_confident": right_objects[confident].mean() if confident.any() else np.nan,
+        "probability": told.mean(),
         "layouts": len(layouts),
     }

@@ -15,7 +15,6 @@ from dollop.environment import corner_indices
 from dollop.formats.files import check_writable
 from dollop.formats.logs import write_log
 from dollop.gridmap import OccupancyGrid
-from dollop.laps import laps
 from dollop.matching import match
 from dollop.observation import observe
 from dollop.replication.runs import free_poses
@@ -115,10 +114,14 @@ class FigureEights:
         What Dollop made of it (Sec. II).
     observed_as_paper : Observation
         The same by the paper's method, for what the paper says of it.
+    demonstration : Demonstration
+        The laps among the two cans.
     laps : list of (N_k, 2) float arrays
-        The five laps in m, cut out of the user's trajectory.
+        The laps in m, cut out of the user's trajectory: five, unless one is left out.
     task : Task
         The control law (Sec. III), tied to the two cans (Sec. IV).
+    task_as_paper : Task
+        The same by the paper's method, for what the paper says of it.
     """
 
     recording: lab.Recording
@@ -132,12 +135,20 @@ class FigureEights:
         return observe(self.recording.log, background_map(), method="paper")
 
     @cached_property
+    def demonstration(self):
+        return Demonstration.of(self.observation)
+
+    @cached_property
     def laps(self):
-        return laps(self.observation.user.t, self.observation.user.positions)
+        return self.demonstration.walks
 
     @cached_property
     def task(self):
-        return Task.of(Demonstration.of(self.observation))
+        return Task.of(self.demonstration)
+
+    @cached_property
+    def task_as_paper(self):
+        return Task.of(self.demonstration, method="paper")
 
 
 # A study asks for many seeds, one after the other: it keeps a few, and the figures' own.
@@ -493,7 +504,7 @@ def slalom_runs(control="pursuit", avoid=True, count=10):
 # ---- what laws and runs are judged by
 
 
-def largest_corner(law, over=0.1):
+def largest_corner(law, over=0.1, method="held"):
     """The largest angle by which a law's response turns where a segment hands over to the next.
 
     Parameters
@@ -501,16 +512,18 @@ def largest_corner(law, over=0.1):
     law : SequencedLDS
     over : float
         In m.
+    method : {"held", "paper"}
+        Which response.
 
     Returns
     -------
     float
         In rad; 0 for a single segment.
     """
-    return float(hand_over_turns(law, over).max(initial=0))
+    return float(hand_over_turns(law, over, method).max(initial=0))
 
 
-def hand_over_turns(law, over=0.1):
+def hand_over_turns(law, over=0.1, method="held"):
     """The angles by which a law's response turns where a segment hands over to the next.
 
     Each is the angle between the ways to the place of the handing over and on from it, each so many
@@ -523,13 +536,15 @@ def hand_over_turns(law, over=0.1):
         Of K segments.
     over : float
         In m.
+    method : {"held", "paper"}
+        Which response.
 
     Returns
     -------
     (K - 1,) float array
         In rad.
     """
-    response = law.response()
+    response = law.response(method=method)
     place = arc_length(response)[_hand_overs(law, response)]
     before, here, after = (at_arc_length(response, place + shift) for shift in (-over, 0, over))
     arriving, going_on = (here - before) @ (1, 1j), (after - here) @ (1, 1j)
@@ -566,13 +581,13 @@ def passing_sides(path, centres):
 
 
 def same_sides(run, task, sides):
-    """Whether a run of the slalom task passes every cone on the demonstrated side.
+    """Whether a run of the slalom task passes every cone that was matched on the demonstrated side.
 
     Parameters
     ----------
     run : Run
     task : Task
-        What was performed.
+        What was performed; learned in the first layout.
     sides : (N,) array_like
         Demonstrated sides of the first layout's cones, as `passing_sides` has them.
 
@@ -580,6 +595,6 @@ def same_sides(run, task, sides):
     -------
     bool
     """
-    matching = match(slalom(0).demonstration.environment, task.environment)
-    cones = task.environment.centres[matching.partners]
-    return bool((passing_sides(run.true_poses[:, :2], cones) == sides).all())
+    found = task.objects >= 0
+    cones = task.environment.centres[task.objects[found]]
+    return bool((passing_sides(run.true_poses[:, :2], cones) == np.asarray(sides)[found]).all())

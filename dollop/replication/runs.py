@@ -46,13 +46,15 @@ def free_poses(count, obstacles, goal, seed, room=0.05):
     return np.array(poses)
 
 
-def distances_to_law(run, law):
+def distances_to_law(run, law, method="held"):
     """How far a robot was from the law's response from where it started (Fig. 7a).
 
     Parameters
     ----------
     run : Run
     law : SequencedLDS
+    method : {"held", "paper"}
+        Which response: a robot under the plain law follows every LDS alone, "paper".
 
     Returns
     -------
@@ -60,10 +62,10 @@ def distances_to_law(run, law):
         Distance of every true pose in m.
     """
     positions = run.true_poses[:, :2]
-    return distance_to_polyline(positions, law.response(positions[0]))
+    return distance_to_polyline(positions, law.response(positions[0], method=method))
 
 
-def return_times(run, law, within=0.10):
+def return_times(run, law, within=0.10, method="held"):
     """How soon after each kidnapping the robot is back on the response, and keeps to it (Fig. 7b).
 
     Parameters
@@ -72,13 +74,15 @@ def return_times(run, law, within=0.10):
     law : SequencedLDS
     within : float
         Back is within so many m of the response from its start, for one second.
+    method : {"held", "paper"}
+        Which response, as for `distances_to_law`.
 
     Returns
     -------
     (M,) float array
         In s; `inf` where it was kidnapped again, or the run ended, before.
     """
-    away = np.flatnonzero(np.append(distances_to_law(run, law) > within, True))
+    away = np.flatnonzero(np.append(distances_to_law(run, law, method) > within, True))
     rows = np.arange(len(run.t))
     leaves = away[np.searchsorted(away, rows)]  # the row in which a robot that is near no longer is
     back = run.t[(leaves - rows) * np.diff(run.t[:2], prepend=0)[-1] >= HELD]

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 
 import dollop
 from dollop.replication import recordings, study
-from dollop.replication.claims import CLAIMS, environment, observing
+from dollop.replication.claims import CLAIMS, environment, learning, observing
 
 GOLDEN = json.loads((ROOT / "study" / "golden.json").read_text())
 PUBLISHED = {claim["id"]: claim for claim in json.loads((ROOT / "claims.json").read_text())}
@@ -145,6 +145,30 @@ def test_another_table_changes_files_of_results_and_no_code(tmp_path):
         assert number["sd"] == pytest.approx(values.std(), rel=1e-3)
         if not criterion.timed:
             assert golden[claim.id][criterion.number]["value"] == values.iloc[0]
+
+
+def test_verdicts_are_on_the_paper_s_own_method():
+    """What Dollop does by default is told beside it, wanted by no criterion and by no verdict."""
+    ours = [criterion for _, criterion in NUMBERS if "ours" in criterion.number.split("_")]
+    assert len(ours) > 15 and all(criterion.wanted is None for criterion in ours)
+
+
+@pytest.mark.parametrize("id", ["shared", "generalize", "subgoals"])
+def test_claims_of_section_v_learn_as_the_paper_does(id, monkeypatch):
+    """Without our learning the paper's numbers are the same, and only those that are told as ours go."""
+    forget()
+    whole = CLAIMS[id].experiment(0)
+    learned = learning.slaloms
+
+    def as_paper(seed, method="paper"):
+        return learned(seed, "paper")
+
+    monkeypatch.setattr(learning, "slaloms", as_paper)
+    alone = CLAIMS[id].experiment(0)
+    changed = {name for name, value in whole.items() if not np.isclose(value, alone[name], equal_nan=True)}
+    assert all("ours" in name.split("_") for name in changed)
+    assert changed or id == "generalize"
+    forget()
 
 
 def test_every_verdict_is_told():

@@ -12,7 +12,7 @@ from dollop import figures as door
 from dollop.checks import EXTRAS
 from dollop.replication import baseline, figures, peers, recordings
 from dollop.replication.figures import moved
-from dollop.replication.figures.controls import CONTROLS, numbers
+from dollop.replication.figures.controls import CONTROLS, RESPONSES, numbers
 from dollop.replication.figures.performing import law_numbers
 from dollop.replication.layouts import matching_shares
 from dollop.replication.runs import distances_to_law
@@ -60,8 +60,9 @@ def test_observing_and_segmenting_are_in_their_bands():
     track = COMMITTED["6a"]
     assert track["track_error_mean_m"] < track["paper_track_error_mean_m"] < 0.060
     assert abs(track["bias_m"]) < 0.02 and 0.05 < track["paper_bias_m"] < 0.20
-    assert 5 <= COMMITTED["6b"]["n_segments"] <= 7
-    assert COMMITTED["6b"]["mean_error_m"] <= 0.020
+    law = COMMITTED["6b"]
+    assert 5 <= law["n_segments"] <= 7
+    assert law["mean_error_m"] <= 0.020 and law["paper_mean_error_m"] <= 0.020
 
 
 def test_performing_is_in_its_bands():
@@ -80,7 +81,10 @@ def test_performing_is_in_its_bands():
 
 
 def test_moved_objects_are_in_their_bands():
-    """Figs 10 and x1: all matched right, all runs finish; robust is right where literal is not."""
+    """Figs 10 and x1: all matched right, all runs finish; robust is right where literal is not.
+
+    How probable it says that it is right is how often it is, within 5 points.
+    """
     assert COMMITTED["10a"]["matching_right"] == COMMITTED["10b"]["matching_right"] == 3
     assert COMMITTED["10b"]["own_finished"] == COMMITTED["10b"]["runs"] == 30
     assert COMMITTED["10b"]["own_collisions"] == 0
@@ -88,10 +92,13 @@ def test_moved_objects_are_in_their_bands():
     assert shares["robust_2_objects"] >= 0.99 and shares["robust_3_objects"] >= 0.97
     assert shares["robust_4_objects"] >= 0.90 and shares["literal_2_objects"] < 0.5
     assert shares["robust_cans_seen"] >= 0.95 > shares["literal_cans_seen"]
+    for n in (2, 3, 4):
+        assert shares[f"robust_{n}_objects_told"] == pytest.approx(shares[f"robust_{n}_objects"], abs=0.05)
+    assert COMMITTED["8"]["robust_probability"] > 0.95
 
 
 def test_learning_is_in_its_bands():
-    """Figs 12 and x2: runs finish on the demonstrated side, where the plain law hits.
+    """Figs 12 and x2: runs finish on the demonstrated side and touch nothing.
 
     Merging is right from two on.
     """
@@ -99,7 +106,7 @@ def test_learning_is_in_its_bands():
     assert model["path_length"] <= model["states_after"] < model["states_before"]
     runs = COMMITTED["12b"]
     assert runs["own_finished"] == runs["own_passed_on_the_demonstrated_side"] == runs["runs"] == 10
-    assert runs["own_collisions"] == 0 and runs["plain_runs_with_collision"] >= 5
+    assert runs["own_collisions"] == 0 and runs["plain_finished"] == 10
     shares = COMMITTED["x2"]
     assert shares["merging_right_2"] >= 0.95 and shares["merging_right_5"] >= 0.99
     assert 0.9 <= shares["merging_error_by_expected"] <= 1.1
@@ -127,11 +134,16 @@ def test_the_notebooks_tell_the_error_of_figure_6b():
 
 
 def test_corners_are_told_for_the_law_that_the_runs_follow():
-    """Adapting turns a law's corners; the law of Figure 10a is that of Figure 10b."""
+    """The law of Figure 10a is that of 10b; it turns at a subgoal as little as what was shown.
+
+    Every LDS alone has larger corners. The slalom's user turned by 16 degrees over two decimetres
+    himself.
+    """
     told = ("6b", "10a", "10b", "12b")
     corners = {panel: COMMITTED[panel]["largest_corner_deg"] for panel in told}
-    assert corners["10a"] == corners["10b"] > corners["6b"] > 0
-    assert 0 < corners["12b"] < 180
+    assert 0 < corners["6b"] < min(COMMITTED["6b"]["paper_largest_corner_deg"], 10)
+    assert 0 < corners["10a"] == corners["10b"] < 10
+    assert 0 < corners["12b"] < 25
 
 
 def test_numbers_are_named_after_the_kind_of_control():
@@ -142,8 +154,9 @@ def test_numbers_are_named_after_the_kind_of_control():
         return SimpleNamespace(finished=finished, collisions=collisions, clearance=clearance)
 
     runs_of = {"plain": [run(True, 2), run(False, 1)], "own": [run(True, 0), run(True, 0)]}
-    found = numbers(runs_of, lambda runs: {"n": len(runs)})
+    found = numbers(runs_of, lambda runs, response: {"n": len(runs), "response": response})
     assert found.pop("runs") == found.pop("plain_n") == found.pop("own_n") == 2
+    assert (found.pop("plain_response"), found.pop("own_response")) == ("paper", "held")
     names = "finished", "collisions", "runs_with_collision", "min_clearance_m"
     assert [found.pop(f"plain_{name}") for name in names] == [1, 3, 2, -1.9]
     assert [found.pop(f"own_{name}") for name in names] == [2, 0, 0, 0.1]
@@ -182,9 +195,9 @@ def test_fresh_runs_are_as_near_to_the_law_as_in_figure_7a():
     """Two of its runs: finished, nothing touched, as near to the response within 15 mm."""
     law = recordings.figure_eights().task.law
     for kind, (_, choices) in CONTROLS.items():
-        runs = recordings.eight_runs(*choices, count=2)
+        runs, response = recordings.eight_runs(*choices, count=2), RESPONSES[kind]
         assert [run.finished and not run.collisions for run in runs] == [True, True]
-        distance = np.mean([distances_to_law(run, law).mean() for run in runs])
+        distance = np.mean([distances_to_law(run, law, response).mean() for run in runs])
         assert distance == pytest.approx(COMMITTED["7a"][f"{kind}_mean_distance_m"], abs=0.015)
 
 

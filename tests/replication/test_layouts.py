@@ -22,17 +22,20 @@ def test_shares_are_what_counting_gives():
         ["missing", "robust"],
     ]
     for row in study.itertuples():
-        rng, counts = np.random.default_rng(9), np.zeros(4)
+        rng, counts, told = np.random.default_rng(9), np.zeros(4), []
         for _ in range(drawn):
             before, after, partners = random_layouts(3, rng, change=row.change, turn=np.pi / 2, **wanted)
             found, truth = match(before, after, method=row.method), corner_indices(partners, np.pi / 2)
             objects = all(a // 4 == b // 4 for a, b in zip(found.indices, truth, strict=True))
+            told.append(found.probability)
             counts += [list(found.indices) == list(truth), objects, found.confident, objects and found.confident]
         right, right_objects, confident, both = counts
         np.testing.assert_allclose([row.right, row.right_objects, row.confident], counts[:3] / drawn)
         if confident:
             assert row.right_if_confident == pytest.approx(both / confident)
         assert row.layouts == drawn
+        assert row.probability == pytest.approx(np.mean(told), nan_ok=True)
+        assert np.isnan(row.probability) == (row.method == "literal")
     assert 0 < study.right[1] < 1 and 0 < study.confident[1] < 1
 
 

@@ -52,6 +52,17 @@ def test_crossing_the_response_is_not_coming_back(task):
     assert 2 < time < 20
 
 
+def test_each_control_is_measured_by_the_response_that_it_follows(task):
+    """A plain run started beside the law keeps to every LDS alone, one that comes back to what was shown."""
+    start = (4.5, 4.0, -0.7)
+    plain = perform(task, Unicycle(start), control="plain", avoid=False)
+    own = perform(task, Unicycle(start))
+    for run, mine, other in ((plain, "paper", "held"), (own, "held", "paper")):
+        away = [distances_to_law(run, task.law, method).mean() for method in (mine, other)]
+        assert away[0] < away[1]
+    assert (distances_to_law(own, task.law) == distances_to_law(own, task.law, "held")).all()
+
+
 def test_free_poses_are_free_and_everywhere(task):
     """They have the room asked for, lie wherever the robot can get, and head anywhere."""
     background = room_map()

@@ -12,6 +12,7 @@ import pytest
 from dollop.checks import EXTRAS
 from dollop.cli import main
 from dollop.formats.files import FormatError
+from dollop.lds import LDS
 from dollop.replication import running, study
 from dollop.replication.claims import (
     Claim,
@@ -23,6 +24,7 @@ from dollop.replication.claims import (
     observing,
     robot,
 )
+from dollop.sequenced_lds import SequencedLDS
 
 
 def claim_of(experiment):
@@ -291,6 +293,18 @@ def test_windings_count_turns():
     path = np.column_stack([np.cos(turn), np.sin(turn)])
     assert measures.windings(path, [[0.2, 0.1], [3, 0]]).tolist() == [2, 0]
     assert measures.windings(path[::-1], [[0.2, 0.1]]).tolist() == [-2]
+
+
+def test_segments_hand_over_where_their_responses_end():
+    """Of two equal straight segments the second is in force from the middle of the way on, by either response."""
+    ways = np.linspace([0.0, 0.0], [2.0, 0.0], 40), np.linspace([2.0, 0.0], [4.0, 0.0], 40)
+    straight = SequencedLDS(tuple(LDS.fit(way) for way in ways), ways[0][0], np.ones(2))
+    half = measures.SHARES // 2
+    for method in ("paper", "held"):
+        found = measures.segments_along(straight, method)
+        assert (found[: half - 2] == 0).all() and (found[half + 2 :] == 1).all()
+        assert measures.error_of(straight, ways, method) < 1e-3
+        assert measures.error_of(straight, [way + [0.0, 0.3] for way in ways], method) == pytest.approx(0.3, abs=1e-3)
 
 
 def test_predictions_of_a_straight_walk_are_right():

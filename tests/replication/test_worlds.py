@@ -181,6 +181,36 @@ def test_a_note_makes_what_is_wrong_doubtful():
     assert Judgement(refused=("learn", "no")).outcome == "refused"
 
 
+def test_what_is_left_out_as_unsure_is_no_mistake(worlds):
+    """Of pairs that adapting took, one of two different objects is wrong; one that it did not take is not."""
+    scene = worlds[0].demonstrations[0]
+    boxes = chain.true_boxes(scene, chain.moved_objects(scene))
+    later = chain.true_boxes(worlds[0].later, worlds[0].later.objects)
+    one, other = np.arange(len(boxes)), np.full(len(boxes), -1)
+    one[:2], other[2:] = [1, 0], one[2:]
+    blamed = []
+    for objects in (np.arange(len(boxes)), one, other):
+        judgement = Judgement()
+        judgement.results = {
+            "task": SimpleNamespace(environment=Environment(boxes)),
+            "now": SimpleNamespace(environment=Environment(later)),
+            "adapted": SimpleNamespace(objects=objects),
+        }
+        chain.judge_adapted(worlds[0], judgement)
+        blamed.append(judgement.causes)
+    assert blamed == [[], ["matching wrong"], []]
+
+
+def test_notes_of_learning_and_adapting_are_listened_to_once():
+    """A task's notes with doubt make what follows doubtful; those that are only good to know do not."""
+    sure, unsure = Note("matching", "left out", False), Note("objects", "hangs on what is gone")
+    judgement = Judgement()
+    for name, notes in (("task", (sure,)), ("adapted", (sure, unsure)), ("again", (unsure,))):
+        judgement.listen([], {name: SimpleNamespace(notes=notes)})
+        assert judgement.outcome == ("right" if name == "task" else "doubtful")
+    assert judgement.doubts == [str(unsure)]
+
+
 def test_an_error_ends_the_chain_and_is_told(monkeypatch, worlds):
     """A refusal is told with its step; an error that is not of the library's own with its name."""
     refusing = {"map": (lambda world, results: {}["nothing"], chain.judge_nothing), **chain.STEPS}

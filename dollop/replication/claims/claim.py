@@ -9,9 +9,9 @@ part.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
+from math import inf, nan
 
-__all__ = ["MORE", "MOSTLY", "NONE", "REGISTRY", "Claim", "Criterion", "claim"]
+__all__ = ["MORE", "MOSTLY", "NONE", "REGISTRY", "Claim", "Criterion", "claim", "unknown"]
 
 MORE, MOSTLY, NONE = (0.0, inf), (0.9, 1), (-inf, 1e-6)
 """What many claims want: more than something else, nine times of ten, nothing but rounding."""
@@ -98,3 +98,19 @@ def claim(section, quote, *criteria, constructed=False):
         return experiment
 
     return register
+
+
+def unknown(id):
+    """The result of an experiment whose seed gives no number.
+
+    Parameters
+    ----------
+    id : str
+        Of the claim.
+
+    Returns
+    -------
+    dict
+        nan for each number that the claim names.
+    """
+    return {criterion.number: nan for criterion in REGISTRY[id].criteria}

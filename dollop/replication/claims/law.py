@@ -1,4 +1,8 @@
-"""Claims on the control law (Sec. III)."""
+"""Claims on the control law (Sec. III).
+
+They are judged by the paper's response, every LDS alone. Dollop's own, which comes back to what was
+shown, is told beside it.
+"""
 
 from math import inf
 
@@ -8,7 +12,14 @@ from dollop.lds import LDS
 from dollop.pose import wrapped
 from dollop.replication import recordings
 from dollop.replication.claims.claim import MORE, MOSTLY, Criterion, claim
-from dollop.replication.claims.measures import SHARES, clear_of, headings, is_eight, segments_along
+from dollop.replication.claims.measures import (
+    SHARES,
+    clear_of,
+    error_of,
+    headings,
+    is_eight,
+    segments_along,
+)
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory, resample
 
@@ -22,6 +33,7 @@ __all__ = []
     Criterion("share_of_lap", "numbers in the law, share of those in one lap", (-inf, 1)),
     Criterion("share_of_polyline", "share of those in a polyline as near to the laps"),
     Criterion("numbers", "numbers in the law"),
+    Criterion("numbers_ours", "numbers in ours, which keeps speeds along the way, pauses and corners"),
 )
 def parameters(seed):
     """How many numbers the law has beside one lap's samples, and beside a polyline no worse.
@@ -33,14 +45,16 @@ def parameters(seed):
     shown = recordings.figure_eights(seed)
     walks, law = shown.laps, shown.task.law
     mean = mean_trajectory(walks)
-    error = distance_to_polyline(mean, law.response()).mean()
+    error = error_of(law, [mean])
     off = (distance_to_polyline(mean, resample(mean, n)).mean() for n in range(2, SHARES))
     corners = next(n for n, each in enumerate(off, start=2) if each <= error)
     count = 7 * len(law.segments) + 2  # A, subgoal and speed of each segment; the start
+    timing = sum(np.size(each) for each in (law.profile, law.pauses, law.corners))
     return {
         "share_of_lap": count / np.mean([walk.size for walk in walks]),
         "share_of_polyline": count / (2 * corners),
         "numbers": float(count),
+        "numbers_ours": float(count + timing),
     }
 
 
@@ -51,26 +65,42 @@ def parameters(seed):
     Criterion("curvature_correlation", "correlation of the curvatures", (0.8, 1)),
     Criterion("speed_off_share", "mean difference of speed, share of the mean speed", (0, 0.1)),
     Criterion("own_speed_off_share", "the same of the LDS's own steps"),
+    Criterion("direction_ours_deg", "direction along our response [degrees]"),
+    Criterion("curvature_correlation_ours", "curvatures along it"),
+    Criterion("speed_off_share_ours", "speed along it"),
 )
 def salient(seed):
     """How far direction, curvature and speed along the law are from those of the laps.
 
     At 200 equal shares of the way. The law's speed is the mean speed that is kept for each segment:
-    re-timed LDS have none of their own. An LDS fitted to the samples as they are has one.
+    re-timed LDS have none of their own. An LDS fitted to the samples as they are has one. Ours is the
+    response at the shown speeds, which are kept along each segment.
     """
     shown = recordings.figure_eights(seed)
     walks, law = shown.laps, shown.task.law
-    walked, planned = mean_trajectory(walks, SHARES), resample(law.response(), SHARES)
-    turns, planned_turns = headings(walked), headings(planned)
-    bends, planned_bends = np.gradient(turns), np.gradient(planned_turns)
+    walked = mean_trajectory(walks, SHARES)
+    off, alike = salient_off(walked, law.response(method="paper"))
+    off_ours, alike_ours = salient_off(walked, law.response())
     speeds = np.mean([speeds_along(walk) for walk in walks], axis=0)
-    own = speeds_along(SequencedLDS.fit(walks, retimed=False).response())
+    own = speeds_along(SequencedLDS.fit(walks, retimed=False).response(method="paper"))
+    ours = speeds_along(law.timed()[1])
+    kept = law.speeds[segments_along(law)]
     return {
-        "direction_deg": np.degrees(np.abs(wrapped(turns - planned_turns)).mean()),
-        "curvature_correlation": np.corrcoef(bends, planned_bends)[0, 1],
-        "speed_off_share": np.abs(law.speeds[segments_along(law)] - speeds).mean() / speeds.mean(),
+        "direction_deg": off,
+        "curvature_correlation": alike,
+        "speed_off_share": np.abs(kept - speeds).mean() / speeds.mean(),
         "own_speed_off_share": np.abs(own - speeds).mean() / speeds.mean(),
+        "direction_ours_deg": off_ours,
+        "curvature_correlation_ours": alike_ours,
+        "speed_off_share_ours": np.abs(ours - speeds).mean() / speeds.mean(),
     }
+
+
+def salient_off(walked, response):
+    """Mean difference of direction in degrees from a walk (SHARES, 2), correlation of the curvatures."""
+    turns, planned = headings(walked), headings(resample(response, SHARES))
+    off = np.degrees(np.abs(wrapped(turns - planned)).mean())
+    return off, np.corrcoef(np.gradient(turns), np.gradient(planned))[0, 1]
 
 
 def speeds_along(walk, period=0.1):
@@ -86,6 +116,7 @@ def speeds_along(walk, period=0.1):
     "encoding the trajectory with a stable control law induced by the LDS",
     Criterion("margin", "one minus the largest spectral radius of forty LDS", MORE),
     Criterion("end_off_m", "how far from the last subgoal twenty responses end [m]", (0, 0.0101)),
+    Criterion("end_off_ours_m", "how far from it ours end [m]"),
     constructed=True,
 )
 def stable(seed):
@@ -98,11 +129,18 @@ def stable(seed):
     walks = [rng.normal(size=(rng.integers(3, 60), 2)).cumsum(axis=0) for _ in range(20)]
     fits = [LDS.fit(walk, retimed=retimed) for walk in walks for retimed in (True, False)]
     law = recordings.figure_eights(seed).task.law
-    ends = [law.response(place)[-1] for place in rng.uniform([0, 0], [9, 7], (20, 2))]
+    places = rng.uniform([0, 0], [9, 7], (20, 2))
     return {
         "margin": 1 - max(np.abs(np.linalg.eigvals(fit.A)).max() for fit in fits),
-        "end_off_m": np.linalg.norm(np.array(ends) - law.subgoals[-1], axis=1).max(),
+        "end_off_m": farthest_end(law, places, "paper"),
+        "end_off_ours_m": farthest_end(law, places, "held"),
     }
+
+
+def farthest_end(law, places, method):
+    """How far in m from the last subgoal responses from places (N, 2) end at most."""
+    ends = [law.response(place, method=method)[-1] for place in places]
+    return np.linalg.norm(np.array(ends) - law.subgoals[-1], axis=1).max()
 
 
 @claim(
@@ -111,6 +149,8 @@ def stable(seed):
     "generalization of the intended user trajectory",
     Criterion("alone_more_m", "error of a law of one lap minus that of a law of several [m]", MORE),
     Criterion("several_m", "error of a law of all laps but the last [m]"),
+    Criterion("several_ours_m", "the same along our response [m]"),
+    Criterion("alone_more_ours_m", "one lap minus several along our response [m]"),
 )
 def laps(seed):
     """Error on a lap of a law from one other lap, and of a law from all other laps.
@@ -119,8 +159,11 @@ def laps(seed):
     others.
     """
     *shown, kept = recordings.figure_eights(seed).laps
-    alone, several = (SequencedLDS.fit(walks).error(kept) for walks in (shown[:1], shown))
-    return {"several_m": several, "alone_more_m": alone - several}
+    laws, numbers = [SequencedLDS.fit(walks) for walks in (shown[:1], shown)], {}
+    for ours, method in (("", "paper"), ("_ours", "held")):
+        alone, several = (error_of(law, [kept], method) for law in laws)
+        numbers |= {f"several{ours}_m": several, f"alone_more{ours}_m": alone - several}
+    return numbers
 
 
 @claim(
@@ -138,8 +181,9 @@ def scaled(seed):
     """
     rng, law = np.random.default_rng([seed, 4]), recordings.figure_eights(seed).task.law
     factor, shift = rng.uniform(0.5, 2.0), rng.uniform(-3, 3, 2)
-    wanted = factor * law.response() + shift
-    given = law.with_subgoals(factor * law.subgoals + shift, factor * law.start + shift).response()
+    wanted = factor * law.response(method="paper") + shift
+    moved = law.with_subgoals(factor * law.subgoals + shift, factor * law.start + shift)
+    given = moved.response(method="paper")
     size = np.linalg.norm(np.ptp(wanted, axis=0))
     return {"off_percent": 100 * distance_to_polyline(wanted, given).max() / size}
 
@@ -170,6 +214,7 @@ def figure(seed):
     Criterion("n_at_40_mm", "at 40 mm"),
     Criterion("error_m", "at 20 mm: mean distance from the laps' mean to the law [m]"),
     Criterion("error_laps_m", "at 20 mm: mean distance from the single laps to the law [m]"),
+    Criterion("error_ours_m", "at 20 mm: from the laps' mean to our response [m]"),
 )
 def segments(seed):
     """Number of LDS at a tolerance of 20 mm, at half and at twice as much; mean errors at 20 mm.
@@ -183,6 +228,7 @@ def segments(seed):
         "n_segments": float(len(law.segments)),
         "n_at_10_mm": float(len(SequencedLDS.fit(walks, tolerance=0.010).segments)),
         "n_at_40_mm": float(len(SequencedLDS.fit(walks, tolerance=0.040).segments)),
-        "error_m": distance_to_polyline(mean_trajectory(walks), law.response()).mean(),
-        "error_laps_m": np.mean([law.error(walk) for walk in walks]),
+        "error_m": error_of(law, [mean_trajectory(walks)]),
+        "error_laps_m": error_of(law, walks),
+        "error_ours_m": error_of(law, [mean_trajectory(walks)], "held"),
     }

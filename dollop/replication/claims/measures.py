@@ -1,14 +1,18 @@
-"""What several claims measure: directions along a way, windings, clearance, plain runs."""
+"""What several claims measure: directions along a way, windings, clearance, plain runs.
 
-from dataclasses import replace
+The paper's claims are judged by the paper's response, every LDS alone; what Dollop does by default is
+told beside it, in numbers that end in "ours".
+"""
 
 import numpy as np
 
 from dollop.replication import recordings
 from dollop.robot.performing import Unicycle, perform
-from dollop.trajectory import arc_length
+from dollop.trajectory import arc_length, distance_to_polyline
 
-__all__ = ["SHARES", "clear_of", "headings", "is_eight", "plain_run", "segments_along", "windings"]
+__all__ = [
+    "SHARES", "clear_of", "error_of", "headings", "is_eight", "plain_run", "segments_along", "windings",
+]  # fmt: skip
 
 SHARES = 200
 """At so many equal shares of the way the law is compared with the laps."""
@@ -34,27 +38,48 @@ def headings(path, width=5):
     return np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
 
 
-def handing_over(law):
+def handing_over(law, method="paper"):
     """Shares (K,) of the response's way at which each segment hands over, the last being 1."""
-    response, parts = law.response(), range(1, len(law.segments) + 1)
-    vertices = [len(replace(law, segments=law.segments[:k]).response()) - 1 for k in parts]
-    way = arc_length(response)
-    return way[vertices] / way[-1]
+    responses = law.responses(method=method)
+    way = arc_length(np.vstack(responses))
+    return way[np.cumsum([len(each) for each in responses]) - 1] / way[-1]
 
 
-def segments_along(law):
+def segments_along(law, method="paper"):
     """Which segment is in force along the response of a law.
 
     Parameters
     ----------
     law : SequencedLDS
+    method : {"held", "paper"}
+        Which response.
 
     Returns
     -------
     (SHARES,) int array
         Its index at equal shares of the way.
     """
-    return np.searchsorted(handing_over(law)[:-1], np.linspace(0, 1, SHARES))
+    return np.searchsorted(handing_over(law, method)[:-1], np.linspace(0, 1, SHARES))
+
+
+def error_of(law, walks, method="paper"):
+    """Mean distance of walks to a law's response.
+
+    Parameters
+    ----------
+    law : SequencedLDS
+    walks : sequence of (N_k, 2) float arrays
+        In m; each counts as much as another.
+    method : {"held", "paper"}
+        Which response.
+
+    Returns
+    -------
+    float
+        In m.
+    """
+    response = law.response(method=method)
+    return np.mean([distance_to_polyline(walk, response).mean() for walk in walks])
 
 
 def windings(path, centres):
@@ -83,7 +108,7 @@ def windings(path, centres):
     return np.round(np.angle(around[:, 1:] / around[:, :-1]).sum(axis=1) / (2 * np.pi)).astype(int)
 
 
-def is_eight(law, scene):
+def is_eight(law, scene, method="paper"):
     """Whether the law's response goes once round the first two objects, in opposite directions.
 
     Parameters
@@ -92,16 +117,19 @@ def is_eight(law, scene):
         Its response is what is measured.
     scene : Scene
         Where the objects really stand.
+    method : {"held", "paper"}
+        Which response.
 
     Returns
     -------
     float
         1 if it does, 0 if not.
     """
-    return float(sorted(windings(law.response(), scene.positions[:2])) == [-1, 1])
+    turns = windings(law.response(method=method), scene.positions[:2])
+    return float(sorted(turns) == [-1, 1])
 
 
-def clear_of(law, scene):
+def clear_of(law, scene, method="paper"):
     """Least distance between the law's response and the foot of any object.
 
     Parameters
@@ -110,13 +138,15 @@ def clear_of(law, scene):
         Its response is what is measured.
     scene : Scene
         Where the objects really stand.
+    method : {"held", "paper"}
+        Which response.
 
     Returns
     -------
     float
         In m, negative where the response runs over one.
     """
-    path = law.response()
+    path = law.response(method=method)
     apart = np.linalg.norm(path[:, None] - scene.positions, axis=2) - scene.foot_radii
     return apart.min()
 

@@ -43,7 +43,7 @@ def follow(seed):
     task = recordings.figure_eights(seed).task
     (start,) = recordings.starts_near_the_beginning(task, 1, np.random.default_rng([seed, 5]))
     run = plain_run(task, start)
-    away = distances_to_law(run, task.law)
+    away = distances_to_law(run, task.law, "paper")
     return {"mean_m": away.mean(), "max_m": away.max(), "finished": float(run.finished)}
 
 
@@ -160,7 +160,7 @@ def first_hit(run):
 
 def return_time(run, law):
     """Time in s from the kidnapping until it is back on the response, infinite if it hits first."""
-    (time,) = return_times(run, law)
+    (time,) = return_times(run, law, method="paper")
     return time if run.kidnapped[0] + time < first_hit(run) else inf
 
 
@@ -171,9 +171,10 @@ def winds_as_demonstrated(run, law, scene):
     later = rows[run.active[rows] > segment]
     if not len(later):
         return True
-    response = law.response()
-    handed_over = len(replace(law, segments=law.segments[: segment + 1]).response()) - 1
-    there_and_back = np.vstack([run.true_poses[later, :2], response[handed_over:][::-1]])
+    responses = law.responses(method="paper")
+    handed_over = responses[segment][-1:]
+    on_from_there = np.vstack([handed_over, *responses[segment + 1 :]])
+    there_and_back = np.vstack([run.true_poses[later, :2], on_from_there[::-1]])
     return not windings(there_and_back, scene.positions[:2]).any()
 
 

@@ -5,7 +5,7 @@ import joblib
 from dollop import plot
 from dollop.replication import recordings
 
-__all__ = ["COLUMNS", "CONTROLS", "at_once", "draw_runs", "numbers", "by_kind"]
+__all__ = ["COLUMNS", "CONTROLS", "RESPONSES", "at_once", "by_kind", "draw_runs", "numbers"]
 
 CONTROLS = {
     "plain": ("the paper's kind of control: plain, obstacles ignored", ("plain", False)),
@@ -15,6 +15,9 @@ CONTROLS = {
 
 COLUMNS = {"plain": "plain, obstacles ignored", "own": "pursuit, going round obstacles"}
 """The same in few words, over the columns of numbers."""
+
+RESPONSES = {"plain": "paper", "own": "held"}
+"""Which response of the law each kind follows: the plain one that of every LDS alone."""
 
 
 def at_once(work, arguments):
@@ -52,8 +55,8 @@ def by_kind(work):
     return dict(zip(CONTROLS, at_once(work, choices), strict=True))
 
 
-def draw_runs(ax, task, runs, title):
-    """Draw the law, and the runs of the robot over it.
+def draw_runs(ax, task, runs, title, method="held"):
+    """Draw the response of the law, and the runs of the robot over it.
 
     Parameters
     ----------
@@ -62,9 +65,11 @@ def draw_runs(ax, task, runs, title):
         What was performed, where it was.
     runs : list of Run
     title : str
+    method : {"held", "paper"}
+        Which response the runs follow.
     """
     plot.workspace(recordings.background_map(), None, task.environment.boxes, ax, title)
-    plot.law(ax, task.law.response())
+    plot.law(ax, task.law.response(method=method))
     plot.runs(ax, runs)
 
 
@@ -76,7 +81,7 @@ def numbers(runs_of, further=None):
     runs_of : dict
         Lists of as many Run, by kind.
     further : callable, optional
-        What else is measured: from a list of Run to a dict.
+        What else is measured: from a list of Run, and which response they follow, to a dict.
 
     Returns
     -------
@@ -85,7 +90,7 @@ def numbers(runs_of, further=None):
     """
     measured = {"runs": len(runs_of["plain"])}
     for kind, runs in runs_of.items():
-        found = outcome(runs) | (further(runs) if further else {})
+        found = outcome(runs) | (further(runs, RESPONSES[kind]) if further else {})
         measured |= {f"{kind}_{name}": value for name, value in found.items()}
     return measured
 

@@ -9,7 +9,15 @@ from dollop import plot
 from dollop.environment import Environment, spring_constants, spring_forces
 from dollop.matching import match
 from dollop.replication import drawing, recordings
-from dollop.replication.figures.controls import COLUMNS, CONTROLS, at_once, by_kind, draw_runs, numbers
+from dollop.replication.figures.controls import (
+    COLUMNS,
+    CONTROLS,
+    RESPONSES,
+    at_once,
+    by_kind,
+    draw_runs,
+    numbers,
+)
 from dollop.replication.figures.panel import panel
 from dollop.replication.layouts import matching_shares
 
@@ -31,8 +39,9 @@ def figure_8():
     one box outweigh those between boxes, so errors of a few centimetres in a box decide: its lines
     lie on the robust ones or cross between boxes as that comes, and its margin is a hair either
     way. Corners count from zero in the numbers: for 1 to 8, in this order, which of a (0) to h (7)
-    it goes to. The two costs have different units; the margin says how far behind the second-best
-    matching is.
+    it goes to. The two costs have different units: the literal one is a change in force, the robust
+    one minus the logarithm of the matching's probability. The margin says how far behind the
+    second-best matching is; of the robust one by how many nats, 3 being a twentieth as probable.
     """
     before, after = recordings.figure_eights().task.environment, recordings.moved_environment(0)
     literal, robust = match(before, after, method="literal"), match(before, after)
@@ -67,7 +76,8 @@ def matching_numbers(before, after):
     found = {"": match(before, after), "literal_": match(before, after, method="literal")}
     measured = {f"{kind}indices": matching.indices.tolist() for kind, matching in found.items()}
     measured |= {f"{kind}cost": matching.cost for kind, matching in found.items()}
-    return measured | {f"{kind}margin": matching.margin for kind, matching in found.items()}
+    measured |= {f"{kind}margin": matching.margin for kind, matching in found.items()}
+    return measured | {"robust_probability": found[""].probability}
 
 
 def outwards(environment):
@@ -168,7 +178,8 @@ def figure_10b():
     runs_of = by_kind(runs_in_every_layout)
     for axes, (kind, (title, _)) in zip(rows, CONTROLS.items(), strict=True):
         for k, ax in enumerate(axes):
-            draw_runs(ax, recordings.adapted_task(k), runs_of[kind][k], f"layout {k + 1}")
+            task, runs = recordings.adapted_task(k), runs_of[kind][k]
+            draw_runs(ax, task, runs, f"layout {k + 1}", RESPONSES[kind])
         axes[1].set_title(f"{title}\nlayout 2")
     show_part(rows.flat, (1.3, 5.3))
     drawing.legend_below(figure, *rows.flat)
@@ -185,7 +196,8 @@ def figure_x1():
     """Beyond the paper: how matching fares when box sizes are uncertain.
 
     Left, objects drawn at random, each moved, and seen with box sizes off by up to so much; the
-    numbers are at 5 cm. The literal cost loses its way as soon as boxes are not exact. Right, cans
+    numbers are at 5 cm, and beside the share right stands the mean probability that the robust
+    matching tells. The literal cost loses its way as soon as boxes are not exact. Right, cans
     and cones that the simulated laser sees, each layout matched to the first: a laser sees one side
     of a can and is off by some centimetres.
     """
@@ -196,6 +208,8 @@ def figure_x1():
     draw_shares_seen(right, dict(zip(("2 cans", "4 cones"), seen, strict=True)))
     known = shares[shares.noise == 0.05]
     measured = {f"{row.method}_{row.objects}_objects": row.right for row in known.itertuples()}
+    for row in known[known.method == "robust"].itertuples():
+        measured[f"robust_{row.objects}_objects_told"] = row.probability
     for kind, share in zip(("cans", "cones"), seen, strict=True):
         measured |= {f"{method}_{kind}_seen": right for method, right in share.items()}
     return figure, measured

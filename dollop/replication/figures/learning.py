@@ -7,7 +7,14 @@ from scipy.stats import binomtest
 
 from dollop import plot
 from dollop.replication import baseline, drawing, recordings
-from dollop.replication.figures.controls import COLUMNS, CONTROLS, by_kind, draw_runs, numbers
+from dollop.replication.figures.controls import (
+    COLUMNS,
+    CONTROLS,
+    RESPONSES,
+    by_kind,
+    draw_runs,
+    numbers,
+)
 from dollop.replication.figures.panel import panel
 from dollop.replication.figures.performing import law_numbers
 
@@ -75,7 +82,11 @@ def draw_shares(ax, method, rows, shift):
     counted = right.itertuples(index=False)
     ends = np.transpose([binomtest(k, n).proportion_ci(method="wilson") for k, n in counted])
     reach = np.maximum([share - ends[0], ends[1] - share], 0)
-    look = {"color": drawing.METHODS[method], "marker": marker, "label": f"{method} ({seeds} seeds)"}
+    look = {
+        "color": drawing.METHODS[method],
+        "marker": marker,
+        "label": f"{method} ({seeds} seeds)",
+    }
     ax.errorbar(share.index + shift, share, reach, **look)
 
 
@@ -135,10 +146,11 @@ def draw_demonstration(k):
 def figure_12a():
     """The CDHMM estimated from the demonstrations of Figure 11, with the most-likely path.
 
-    Both demonstrations were mapped to the first one's environment (dots and triangles); then states
-    that the evidence cannot tell apart were merged. An ellipse is two standard deviations of where
-    a state's subgoal is expected. With two demonstrations that is nearly all prior: the model
-    starts from the spread below, and the two subgoals of a state change it little.
+    Both demonstrations were mapped to the first one's environment (dots and triangles), each subgoal
+    by the objects that its place follows; then states that the evidence cannot tell apart were
+    merged. An ellipse is two standard deviations of where a state's subgoal is expected. With two
+    demonstrations that is nearly all prior: the model starts from the spread below, which all
+    subgoals together tell, and the two of a state change it little.
     """
     task = recordings.slalom_task()
     figure, ax = plt.subplots(figsize=SIZE)
@@ -162,16 +174,16 @@ def figure_12b():
     """The result after mapping the subgoals to a new environment.
 
     Nobody ever walked among these cones; the fan is the starts of ten runs, the same above and
-    below. Above the paper's kind of control: the plain law, which knows of no obstacle. It touches
-    a cone, backs off and gets round it: past the third cone the law leaves less room than the robot
-    needs, for a law is a line, and moved subgoals do not keep every distance. Below Dollop's own:
-    it goes round what is in the way, and that alone is why nothing is touched. The circles are the
-    robot where it first touches something.
+    below. Both times the law is what two demonstrations together tell of which cone each of its
+    places follows. Above the paper's kind of control: the plain law, which knows of no obstacle and
+    comes as near to the cones as the law does. Below Dollop's own, which goes round what is near:
+    between two cones it keeps to the middle and leaves the law. The largest corner is where the
+    user turned as sharply. A circle, if there is one, is the robot where it first touches something.
     """
     task, runs_of = recordings.new_slalom_task(), by_kind(recordings.slalom_runs)
     figure, axes = plt.subplots(2, 1, figsize=(8, 6.4), sharex=True)
     for ax, (kind, (title, _)) in zip(axes, CONTROLS.items(), strict=True):
-        draw_runs(ax, task, runs_of[kind], title)
+        draw_runs(ax, task, runs_of[kind], title, RESPONSES[kind])
         plot.subgoals(ax, task.law.subgoals)
         ax.set(xlim=(0.6, 8.4), ylim=(2.2, 4.8))
     axes[0].set_xlabel("")

@@ -16,7 +16,6 @@ from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.lab.outlines import outline_distances
 from dollop.lab.people import walk_of
-from dollop.matching import match
 from dollop.observation import observe
 from dollop.replication.worlds.draw import moved_objects
 from dollop.replication.worlds.view import objects_in_view
@@ -94,11 +93,12 @@ class Judgement:
             self.causes.append(cause)
 
     def listen(self, caught, results):
-        """Take down the warnings that were given, and the notes that results carry."""
+        """Take down the warnings that were given, and the notes with doubt that results carry."""
         self.doubts += [str(each.message) for each in caught if issubclass(each.category, UserWarning)]
         for result in results.values():
             for each in result if isinstance(result, list) else [result]:
                 self.doubts += [str(note) for note in getattr(each, "notes", ()) if note.doubt]
+        self.doubts = list(dict.fromkeys(self.doubts))  # a task carries the notes of what it was learned from
 
     @property
     def outcome(self):
@@ -193,9 +193,8 @@ def call_look(world, results):
 
 
 def call_adapt(_, results):
-    """The task among them, and the matching that this takes."""
-    adapted = results["task"].adapt(results["now"].environment)
-    return {"adapted": adapted, "matching": match(results["task"].environment, results["now"].environment)}
+    """The task among them."""
+    return {"adapted": results["task"].adapt(results["now"].environment)}
 
 
 def call_perform(world, results):
@@ -228,7 +227,10 @@ def judge_observed(world, judgement):
     found = zip(judgement.results["observations"], judgement.results["recordings"], strict=True)
     for each, recording in found:
         if each.user is None:
-            judgement.refused = "observe", f"nobody moved: {len(each.tracks)} tracks, none is the user"
+            judgement.refused = (
+                "observe",
+                f"nobody moved: {len(each.tracks)} tracks, none is the user",
+            )
             return
         judge_user(each.user, recording.truth, judgement)
         judge_objects(each.environment, recording, judgement)
@@ -310,9 +312,10 @@ def distance_to_boxes(box, boxes):
 
 
 def judge_learned(world, judgement):
-    """Whether the law is what the first demonstration showed, and all of it."""
-    truth = judgement.results["recordings"][0].truth
-    walk, response = evenly(truth[["x", "y"]].to_numpy()), evenly(judgement.results["task"].law.response())
+    """Whether the law of its way is what the first demonstration showed, and all of it."""
+    truth, task = judgement.results["recordings"][0].truth, judgement.results["task"]
+    (law,) = [law for law, way in zip(task.ways, task.learned, strict=True) if 0 in way.members]
+    walk, response = evenly(truth[["x", "y"]].to_numpy()), evenly(law.response())
     astray = float(np.mean(nearest(response, walk) > NEAR))
     covered = float(np.mean(nearest(walk, response) <= NEAR))
     judgement.numbers |= {"law_astray": round(astray, 4), "law_covered": round(covered, 4)}
@@ -336,11 +339,14 @@ def judge_look(world, judgement):
 
 
 def judge_adapted(world, judgement):
-    """Whether every object is matched with itself, as far as both are found."""
+    """Whether no object is taken for another one, as far as both are found.
+
+    One of which it is not sure where it went is left out, which is no mistake.
+    """
     results, scene = judgement.results, world.demonstrations[0]
     old = partners(results["task"].environment.boxes, true_boxes(scene, moved_objects(scene)))
     new = partners(results["now"].environment.boxes, true_boxes(world.later, world.later.objects))
-    pairs = [(old[i], new[j]) for i, j in enumerate(results["matching"].partners) if j >= 0]
+    pairs = [(old[i], new[j]) for i, j in enumerate(results["adapted"].objects) if j >= 0]
     judgement.blame("matching wrong", any(a >= 0 and b >= 0 and a != b for a, b in pairs))
 
 
