@@ -28,7 +28,7 @@ __all__ = [
 HORIZON, SETTLED = 48, 4.0
 """The search follows a response over this many points, over this many time constants."""
 
-AT_ONCE = 320  # segments looked at together: what is held of them stays in a processor's cache
+AT_ONCE = 4096  # segments looked at together, so that what is held of them stays within some ten MB
 FIRST_LOOK = 4  # cuts within a segment
 ROUNDING = 1e-9  # share of a sum that its order may change
 EVEN = 1e-8  # m per squared cut: of equal errors the more even division, not as rounding has it
