@@ -84,8 +84,8 @@ class Matching:
     indices : (4N,) int array
         Corner a of i goes to corner indices[a] of j; -1 where it is left out.
     cost : float
-        Literal: the total change in force in 1/alpha 1/m². Robust: how much less probable the
-        matching is than if nothing of what is matched had moved or looked different, in nats.
+        Literal: the total change in force in 1/alpha 1/m². Robust: the negative logarithm of the
+        matching's probability, in nats.
     margin : float
         What the best of all other matchings costs more; 0 is a tie. Literal: of all other
         bijections of the corners. Robust: of all matchings with another partner for one object at
@@ -295,14 +295,16 @@ def match_surely(environment_i, environment_j, names):
         return Matching.identity(len(environment_i)), ()
     matching = match(environment_i, environment_j)
     doubtful = np.flatnonzero(~matching.sure)
-    if not len(doubtful):
-        return matching, ()
-    pair, found = " and ".join(names), ", ".join(map(matching._told, doubtful))
-    if len(doubtful) == len(environment_i):
-        rule = f"nothing reaches the {_percent(SURE)} that it takes"
+    pair, found = " and ".join(names), ", ".join(map(matching._told, range(len(environment_i))))
+    nothing = not (matching.sure & (matching.partners >= 0)).any()
+    if nothing and min(len(environment_i), len(environment_j)):
+        rule = f"no pair reaches the {_percent(SURE)} that it takes"
         advice = "give the matching, as adapt(environment, matching=Matching.of_partners([...]))"
         advice += " or learn(..., matchings=[...]), or move the objects apart"
         raise ValueError(f"{pair} cannot be matched with confidence: {found}; {rule}; {advice}")
+    if not len(doubtful):
+        return matching, ()
+    found = ", ".join(map(matching._told, doubtful))
     indices = np.where(np.repeat(matching.sure, 4), matching.indices, -1)
     text = f"{pair}: not sure which object is which, and left out: {found}"
     return replace(matching, indices=indices), (Note("matching", text, doubt=False),)
