@@ -109,12 +109,8 @@ def _told(members, laid):
             )
         if missed > MISSED:
             rule = f"more than the {MISSED} m that walks of one way differ"
-            notes.append(
-                Note(
-                    "missed",
-                    f"the task misses demonstration {k} by {missed:.2f} m over a stretch, {rule}",
-                )
-            )
+            text = f"the task misses demonstration {k} by {missed:.2f} m over a stretch, {rule}"
+            notes.append(Note("missed", text, False))
     return notes
 
 
@@ -198,6 +194,6 @@ def told_of_places(ways, tolerances, partners):
 
 
 def _share_in_words(places):
-    """From where to where places (L,) of a way are true."""
+    """How much of a way the places (L,) that are true are, and from where to where they lie."""
     inside = 100 * np.flatnonzero(places) / (len(places) - 1)
-    return f"{inside.mean():.0f} %" if inside[0] == inside[-1] else f"from {inside[0]:.0f} to {inside[-1]:.0f} %"
+    return f"{100 * places.mean():.0f} % (from {inside[0]:.0f} to {inside[-1]:.0f} %)"

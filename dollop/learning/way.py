@@ -94,7 +94,7 @@ class Way:
         ValueError
             Where a place follows only what is not there.
         """
-        frames = frames_like(self.objects, self.turning, environment, partners)
+        frames = frames_like(self.objects, self.turning, environment, np.asarray(partners, int))
         places = self.places
         if turn:
             still = ~self.turning & (self.objects >= 0)

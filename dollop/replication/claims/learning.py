@@ -221,11 +221,18 @@ def generalize(seed):
     for method, ours in (("paper", ""), ("anchored", "_ours")):
         found, rng = slaloms(seed, method), np.random.default_rng([seed, 20])
         (start,) = recordings.starts_near_the_beginning(found.both, 1, rng)
-        plain = plain_run(found.both, start)
         numbers[f"sides_right{ours}"] = sides_right(found.both, found.kept, RESPONSES[method])
-        numbers[f"plain_clear{ours}"] = float(plain.finished and not plain.collisions)
-    aware = perform(found.both, Unicycle(start), background=grid)
-    return numbers | {"clear_ours": float(aware.finished and not aware.collisions)}
+        numbers[f"plain_clear{ours}"] = clear(plain_run, found.both, start)
+    return numbers | {"clear_ours": clear(perform, found.both, Unicycle(start), background=grid)}
+
+
+def clear(run, *inputs, **choices):
+    """Whether a run finishes and touches nothing; one that is refused, its subgoal in a cone, does not."""
+    try:
+        driven = run(*inputs, **choices)
+    except ValueError:
+        return 0.0
+    return float(driven.finished and not driven.collisions)
 
 
 def walked_errors(found, response):
