@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from dollop.association import Association, associate, layout_turn
-from dollop.checks import Note, check_choice, put_in
+from dollop.checks import Note, check_choice, put_in, trusted
 from dollop.environment import Environment
 from dollop.formats.files import whole_file
 from dollop.laps import cut_laps
@@ -167,6 +167,11 @@ class Task:
         shown, subgoals = len(self.demonstrations), len(self.law.segments)
         ways = f" in {len(self.ways)} ways" if len(self.ways) > 1 else ""
         return f"Task of {subgoals} subgoals, shown {shown} x{ways}; {self.environment}"
+
+    @property
+    def trusted(self):
+        """Whether no note puts the task in doubt."""
+        return trusted(self.notes)
 
     @classmethod
     def of(cls, demonstration, method="anchored"):
