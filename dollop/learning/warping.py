@@ -113,6 +113,7 @@ def _traced(total, cost, place, sample):
         step = int(np.argmin(before))
         place, sample = place - (step != 2), sample - (step != 1)
     covered = counts > 0
+    covered &= ~_waiting(sums / np.maximum(counts, 1), cost)
     beyond += sample
     at = (
         np.interp(np.arange(places), np.flatnonzero(covered), sums[covered] / counts[covered])
@@ -120,3 +121,14 @@ def _traced(total, cost, place, sample):
         else sums
     )
     return at, covered, beyond
+
+
+def _waiting(at, cost):
+    """Places (L,) for which a walk's first or last sample only waits: it belongs to the most alike."""
+    first, last = np.flatnonzero(at == 0), np.flatnonzero(at == cost.shape[1] - 1)
+    waiting = np.zeros(len(at), bool)
+    if len(first) > 1:
+        waiting[first[: int(cost[first, 0].argmin())]] = True
+    if len(last) > 1:
+        waiting[last[int(cost[last, -1].argmin()) + 1 :]] = True
+    return waiting

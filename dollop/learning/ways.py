@@ -18,7 +18,7 @@ __all__ = ["MISSED", "PLACES", "Laid", "divided", "laid_together"]
 
 PLACES = 80
 """Of a way: about one every 0.15 m of a walk through a room."""
-SPREADS, REFERENCES = (0.5, 0.35, 0.25, 0.25), 5
+SPREADS, REFERENCES = (0.5, 0.35, 0.25, 0.15), 5
 """m: how far walks may miss the same place, each time that they are laid onto the way, wide at first
 while it is hardly known; and from how many of the walks it begins."""
 PULL = 5.0
