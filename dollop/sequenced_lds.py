@@ -8,7 +8,7 @@ import numpy as np
 from dollop.checks import check_choice, check_positive, checked_array
 from dollop.law.line import lines_of
 from dollop.law.timing import CORNER, Stands, shown_pauses, shown_profile, times_along, turns_at
-from dollop.lds import LDS
+from dollop.lds import LDS, Statistics
 from dollop.segmentation import (
     best_segments,
     fewest_cuts,
@@ -525,20 +525,24 @@ class Division:
 
     def segments(self, cuts):
         """The LDS of each segment, for cuts (S + 1,)."""
-        spans = zip(cuts[:-1], np.diff(cuts), self.path[cuts[1:]], strict=True)
-        return tuple(LDS(self.statistics(start, length), goal) for start, length, goal in spans)
+        return self._looked_at(cuts)[0]
 
     def lines(self, cuts):
         """The line of each segment (`SequencedLDS.lines`), for cuts (S + 1,)."""
+        return self._looked_at(cuts)[1]
+
+    def _looked_at(self, cuts):
+        """Segments and lines for cuts (S + 1,), made once."""
         key = cuts.tobytes()
-        if key not in self._lines:
-            corners = self.stops(cuts)[1]
-            self._lines[key] = lines_of(self.segments(cuts), self.path[0], corners, REACH)
-        return self._lines[key]
+        if key not in self._known:
+            of_all, goals = self.statistics(cuts[:-1], np.diff(cuts)), self.path[cuts[1:]]
+            segments = tuple(map(LDS, map(Statistics, of_all.G0, of_all.G1), goals))
+            self._known[key] = segments, lines_of(segments, self.path[0], self.stops(cuts)[1], REACH)
+        return self._known[key]
 
     @cached_property
-    def _lines(self):
-        """The lines of divisions that were looked at."""
+    def _known(self):
+        """Segments and lines of divisions that were looked at."""
         return {}
 
     def stops(self, cuts):
@@ -550,7 +554,12 @@ class Division:
 
     def turns(self, cuts):
         """How far (S,) in rad the path turns at the end of each segment, for cuts (S + 1,)."""
-        return turns_at(self.path, arc_length(self.path)[cuts[1:]])
+        return self._turns[cuts[1:]]
+
+    @cached_property
+    def _turns(self):
+        """How far (C,) in rad the path turns at each candidate cut."""
+        return turns_at(self.path, arc_length(self.path))
 
     def excess(self, cuts, tolerance):
         """How far (S,) each segment's rounded line is beside the path, and turns at its end too far.

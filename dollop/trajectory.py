@@ -102,8 +102,10 @@ def arc_length(points):
     >>> arc_length([[0, 0], [3, 4], [3, 5]])
     array([0., 5., 6.])
     """
-    steps = np.linalg.norm(np.diff(np.asarray(points, float), axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    points = np.asarray(points, float)
+    way = np.zeros(len(points))
+    np.linalg.norm(points[1:] - points[:-1], axis=1).cumsum(out=way[1:])
+    return way
 
 
 def at_arc_length(points, distance):
