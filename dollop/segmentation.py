@@ -299,11 +299,11 @@ def candidate_responses(statistics, x0):
     step = componentwise_matrix(statistics)
     for k in range(doublings.max()):
         step = np.where(k < doublings, product(step, step), step)
-    states, known = np.zeros((2, HORIZON + 2, x0.shape[1])), 1
-    states[:, 0] = x0
+    states, known = np.empty((2, HORIZON + 2, x0.shape[1])), 1
+    states[:, 0], states[:, -1] = x0, 0
     while known <= HORIZON:
         more = min(known, HORIZON + 1 - known)
-        states[:, known : known + more] = product(step, states[:, :more])
+        product(step, states[:, :more], states[:, known : known + more])
         step, known = product(step, step), known + more
     return states
 
@@ -315,17 +315,22 @@ def componentwise_matrix(statistics):
     return product(G1, adjugate) / (G0[0, 0] * G0[1, 1] - G0[0, 1] * G0[1, 0])
 
 
-def product(A, B):
+def product(A, B, out=None):
     """A B of matrices (2, 2, ...) and (2, m, ...), components first."""
-    AB = A[:, :1] * B[:1]
+    AB = np.multiply(A[:, :1], B[:1], out=out)
     AB += A[:, 1:] * B[1:]
     return AB
 
 
 def lifted_vertices(polylines):
     """-2 v and |v|^2 of the vertices v of polylines (2, V, B), as (B, 3, V): for `nearest_vertices`."""
-    v = polylines.transpose(2, 0, 1).astype(np.float32, order="C")
-    return np.concatenate([-2 * v, v[:, :1] * v[:, :1] + v[:, 1:] * v[:, 1:]], axis=1)
+    lifted = np.empty((polylines.shape[2], 3, polylines.shape[1]), np.float32)
+    np.multiply(polylines.transpose(2, 0, 1), -2, out=lifted[:, :2], casting="same_kind")
+    x, y, square = lifted.transpose(1, 0, 2)
+    np.multiply(x, x, out=square)
+    square += y * y
+    square *= 0.25
+    return lifted
 
 
 def nearest_vertices(points, lifted):
