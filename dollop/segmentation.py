@@ -9,6 +9,7 @@ Symbols: C candidate cuts, d = 2 dimensions, K trajectories; G0 and G1 as in `do
 """
 
 from functools import lru_cache
+from math import prod
 
 import numpy as np
 
@@ -234,26 +235,42 @@ def errors_within(path, statistics, tolerance):
     """
     errors = np.full((len(path), len(path)), np.inf)
     cuts = np.arange(len(path))
-    fresh, missed = cuts[:1], cuts[1:]
+    fresh, missed, room = cuts[:1], cuts[1:], room_for_responses()
     while len(fresh) and cuts[-1] in missed:
-        fill_errors(errors, path, statistics, fresh, missed, tolerance)
+        fill_errors(errors, path, statistics, fresh, missed, tolerance, room)
         hit = np.isfinite(errors[np.ix_(fresh, missed)]).any(axis=0)
         fresh, missed = missed[hit], missed[~hit]
     return errors
 
 
-def fill_errors(errors, path, statistics, starts, ends, tolerance):
+def fill_errors(errors, path, statistics, starts, ends, tolerance, room=None):
     """Enter the errors in m of segments from any of `starts` to any of `ends`, where within tolerance."""
+    room = room_for_responses() if room is None else room
     length = ends - starts[:, None]
     rows, columns = np.nonzero(length >= 2)
     order = np.argsort(length[rows, columns], kind="stable")
     start, end = starts[rows[order]], ends[columns[order]]
     for k in range(0, len(order), AT_ONCE):
         some = start[k : k + AT_ONCE], end[k : k + AT_ONCE]
-        errors[some] = errors_of_some(path, statistics, *some, tolerance)
+        errors[some] = errors_of_some(path, statistics, *some, tolerance, room)
 
 
-def errors_of_some(path, statistics, start, end, tolerance):
+def room_for_responses():
+    """Room for one lot of responses after the other: states, and vertices in single precision.
+
+    Asked of the system anew for each lot, and given back, it would take a tenth of the search.
+    """
+    states, vertices = (each * (HORIZON + 2) * AT_ONCE for each in (2, 3))
+    room = np.empty(states + (vertices + 1) // 2)
+    return room[:states], room[states:].view(np.float32)
+
+
+def part_of(room, *shape):
+    """An array of that shape at the beginning of a room."""
+    return room[: prod(shape)].reshape(shape)
+
+
+def errors_of_some(path, statistics, start, end, tolerance, room):
     """Errors (B,) in m of segments from start to end (B,), `inf` where their mean exceeds the tolerance.
 
     Few cuts all over a segment are looked at first, then as many again, and so on; but no more
@@ -261,8 +278,10 @@ def errors_of_some(path, statistics, start, end, tolerance):
     """
     length, columns = end - start, np.ascontiguousarray(path.T)
     goals = columns.take(end, axis=1)
-    polylines = candidate_responses(statistics(start, length), columns.take(start, axis=1) - goals)
-    vertices, order = lifted_vertices(polylines), spread_order(len(path))
+    size, offsets = (HORIZON + 2, len(start)), columns.take(start, axis=1) - goals
+    polylines = candidate_responses(statistics(start, length), offsets, part_of(room[0], 2, *size))
+    vertices = lifted_vertices(polylines, part_of(room[1], size[1], 3, size[0]))
+    order = spread_order(len(path))
     total, left, seen, enough = np.zeros(len(start)), np.arange(len(start)), 0, FIRST_LOOK
     while len(left):
         cuts = start[left, None] + order[length[left], seen : min(enough, length[left].max() - 1)]
@@ -288,7 +307,7 @@ def spread_order(count):
     return order
 
 
-def candidate_responses(statistics, x0):
+def candidate_responses(statistics, x0, out=None):
     """Responses (2, HORIZON + 2, B) from offsets x0 (2, B), up to the subgoal at 0.
 
     Slow systems are shown by every m-th state, m a power of two such that the response settles
@@ -299,7 +318,7 @@ def candidate_responses(statistics, x0):
     step = componentwise_matrix(statistics)
     for k in range(doublings.max()):
         step = np.where(k < doublings, product(step, step), step)
-    states, known = np.empty((2, HORIZON + 2, x0.shape[1])), 1
+    states, known = np.empty((2, HORIZON + 2, x0.shape[1])) if out is None else out, 1
     states[:, 0], states[:, -1] = x0, 0
     while known <= HORIZON:
         more = min(known, HORIZON + 1 - known)
@@ -322,9 +341,10 @@ def product(A, B, out=None):
     return AB
 
 
-def lifted_vertices(polylines):
+def lifted_vertices(polylines, out=None):
     """-2 v and |v|^2 of the vertices v of polylines (2, V, B), as (B, 3, V): for `nearest_vertices`."""
-    lifted = np.empty((polylines.shape[2], 3, polylines.shape[1]), np.float32)
+    count, many = polylines.shape[1:]
+    lifted = np.empty((many, 3, count), np.float32) if out is None else out
     np.multiply(polylines.transpose(2, 0, 1), -2, out=lifted[:, :2], casting="same_kind")
     x, y, square = lifted.transpose(1, 0, 2)
     np.multiply(x, x, out=square)

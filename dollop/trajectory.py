@@ -10,7 +10,10 @@ import scipy
 from dollop.checks import checked_positions
 
 _AT_ONCE = 1 << 14  # pairs of a point and an edge measured at once: they stay in a processor's cache
-_FAR, _NEAR = 0.2, 0.15  # of the walks' size: farther is another way, nearer is not (letters of one kind: 0.14)
+_FAR, _NEAR = (
+    0.2,
+    0.15,
+)  # of the walks' size: farther is another way, nearer is not (letters of one kind: 0.14)
 _STRAY = 1.0  # m, twice as far as walked subgoals scatter: another way, if the others keep together
 _TOGETHER = 3.0  # others keep together if this many times as close (sets of one way: 2.8 in 600)
 _NAMED = 5  # more walks are counted, not named

@@ -102,7 +102,8 @@ class Line:
         counts = np.ceil(PARTS * (way[1:] - way[:-1]) / max(way[-1], reach)).astype(int).clip(1)
         ends = counts.cumsum()
         after = np.arange(ends[-1]) - (ends - counts).repeat(counts)
-        steps = np.append(np.arange(len(counts)).repeat(counts) + after / counts.repeat(counts), len(counts))
+        steps = np.arange(len(counts)).repeat(counts) + after / counts.repeat(counts)
+        steps = np.append(steps, len(counts))
         return cls(curve(states, steps), steps, lds.A, abs(float(lds.statistics.decay)))
 
     @cached_property
@@ -339,7 +340,8 @@ class Half:
         if not way[-1] > 0:
             return None
         at = way[-1] * BEGINS
-        (tail, x, head), (tail_y, y, head_y) = (np.interp(at, way, column).tolist() for column in line.T)
+        places = (np.interp(at, way, column).tolist() for column in line.T)
+        (tail, x, head), (tail_y, y, head_y) = places
         size, length = hypot(head - tail, head_y - tail_y), hypot(line[-1, 0] - x, line[-1, 1] - y)
         if min(size, length) < 1e-9 * way[-1]:
             return None
