@@ -19,6 +19,7 @@ from dollop.trajectory import remaining_share
 __all__ = [
     "HORIZON",
     "best_segments",
+    "cuts_within",
     "fewest_cuts",
     "fewest_segments",
     "raw_statistics",
@@ -187,13 +188,13 @@ def segment_errors(path, statistics):
     >>> bool((errors[np.isfinite(errors)] < 1e-9).all())
     True
     """
-    errors = np.full((len(path), len(path)), np.inf)
+    errors = np.full((len(path), len(path)), np.nan)
     cuts = np.arange(len(path))
-    fill_errors(errors, path, statistics, cuts, cuts, np.inf)
-    return errors
+    fill_errors(errors, path, statistics, (cuts, cuts), np.inf, room_for_responses())
+    return looked_at(errors)
 
 
-def fewest_cuts(path, statistics, tolerance):
+def fewest_cuts(path, statistics, tolerance, errors=None):
     """`fewest_segments` of all `segment_errors`, found by looking only at those that can matter.
 
     Parameters
@@ -204,6 +205,8 @@ def fewest_cuts(path, statistics, tolerance):
         (start, length) -> Statistics.
     tolerance : float
         Largest mean error of a segment, m.
+    errors : (C, C) float array, optional
+        As of `cuts_within`; by default nothing is known.
 
     Returns
     -------
@@ -223,31 +226,77 @@ def fewest_cuts(path, statistics, tolerance):
     >>> fewest_cuts(corner[::2], retimed_statistics(corner[None]), 0.01)
     array([0, 4, 8])
     """
-    cuts = divide(errors_within(path, statistics, tolerance), lambda total, k: np.isfinite(total))
-    return fewest_segments(segment_errors(path, statistics), tolerance) if cuts is None else cuts
+    errors = np.full((len(path), len(path)), np.nan) if errors is None else errors
+    impossible = errors == np.inf
+    cuts = cuts_within(path, statistics, tolerance, errors)
+    if cuts is not None:
+        return cuts
+    return fewest_segments(np.where(impossible, np.inf, segment_errors(path, statistics)), tolerance)
 
 
-def errors_within(path, statistics, tolerance):
-    """The `segment_errors` (C, C) that a division into the fewest segments can need, `inf` elsewhere.
+def cuts_within(path, statistics, tolerance, errors):
+    """As `fewest_cuts`, from what is known of the errors; what else is needed is entered there.
+
+    Parameters
+    ----------
+    path : (C, 2) float array
+        The walks' mean at the candidate cuts, m.
+    statistics : callable
+        (start, length) -> Statistics.
+    tolerance : float
+        Largest mean error of a segment, m.
+    errors : (C, C) float array
+        m; NaN where not looked at, `inf` where above the tolerance or refused. Changed in place.
+
+    Returns
+    -------
+    (S + 1,) int array or None
+        The cuts of S segments, the first 0 and the last C - 1; None if no division keeps the
+        tolerance.
+
+    Examples
+    --------
+    A segment that is refused is done without:
+
+    >>> line = np.linspace([0.0, 0.0], [4.0, 2.0], 17)
+    >>> known, asked = np.full((9, 9), np.nan), (line[::2], retimed_statistics(line[None]), 0.01)
+    >>> cuts_within(*asked, known)
+    array([0, 8])
+    >>> known[0, 8] = np.inf
+    >>> len(cuts_within(*asked, known))
+    3
+    """
+    look_within(path, statistics, tolerance, errors)
+    return divide(looked_at(errors), lambda total, k: np.isfinite(total))
+
+
+def looked_at(errors):
+    """Errors (C, C), `inf` where they are not known."""
+    return np.where(np.isnan(errors), np.inf, errors)
+
+
+def look_within(path, statistics, tolerance, errors):
+    """Enter the errors (C, C) in m that a division into the fewest segments can need.
 
     Such a division goes from every cut to one that no fewer segments reach: so first come the cuts
     that one segment within the tolerance reaches, then those that a second reaches from there.
     """
-    errors = np.full((len(path), len(path)), np.inf)
     cuts = np.arange(len(path))
     fresh, missed, room = cuts[:1], cuts[1:], room_for_responses()
     while len(fresh) and cuts[-1] in missed:
-        fill_errors(errors, path, statistics, fresh, missed, tolerance, room)
+        fill_errors(errors, path, statistics, (fresh, missed), tolerance, room)
         hit = np.isfinite(errors[np.ix_(fresh, missed)]).any(axis=0)
         fresh, missed = missed[hit], missed[~hit]
-    return errors
 
 
-def fill_errors(errors, path, statistics, starts, ends, tolerance, room=None):
-    """Enter the errors in m of segments from any of `starts` to any of `ends`, where within tolerance."""
-    room = room_for_responses() if room is None else room
+def fill_errors(errors, path, statistics, cuts, tolerance, room):
+    """Enter the errors in m of segments between some cuts and others, `inf` where above the tolerance.
+
+    Those that are not NaN are known.
+    """
+    starts, ends = cuts
     length = ends - starts[:, None]
-    rows, columns = np.nonzero(length >= 2)
+    rows, columns = np.nonzero((length >= 2) & np.isnan(errors[np.ix_(starts, ends)]))
     order = np.argsort(length[rows, columns], kind="stable")
     start, end = starts[rows[order]], ends[columns[order]]
     for k in range(0, len(order), AT_ONCE):

@@ -11,8 +11,8 @@ from dollop.law.timing import CORNER, Stands, shown_pauses, shown_profile, times
 from dollop.lds import LDS, Statistics
 from dollop.segmentation import (
     best_segments,
+    cuts_within,
     fewest_cuts,
-    fewest_segments,
     raw_statistics,
     retimed_statistics,
     segment_errors,
@@ -489,25 +489,17 @@ class Division:
         than the path; with them those like them. Then the walk is divided anew. Where that does not
         end in `ROUNDS`, or no division is left, the least excess is taken, the first among equals.
         """
-        if not self.pauses:
-            cuts = fewest_cuts(self.path, self.statistics, tolerance)
-            if self.excess(cuts, tolerance).max() <= 1:
-                return cuts
-        errors, tried = self._cut(self.errors, list(self.pauses)), []
-        while len(tried) < ROUNDS:
-            try:
-                cuts = fewest_segments(errors, tolerance)
-            except ValueError:
-                if not tried:
-                    raise
-                break
+        errors, tried = self._possible(list(self.pauses), np.nan), []
+        cuts = fewest_cuts(self.path, self.statistics, tolerance, errors)
+        while cuts is not None:
             excess = self.excess(cuts, tolerance)
             tried.append((excess.max(), cuts))
-            if excess.max() <= 1:
+            if excess.max() <= 1 or len(tried) == ROUNDS:
                 break
             for k in np.flatnonzero(excess > 1):
                 rows, columns = (slice(max(each - 1, 0), each + 2) for each in cuts[k : k + 2])
                 errors[rows, columns] = np.inf
+            cuts = cuts_within(self.path, self.statistics, tolerance, errors)
         return min(tried, key=lambda each: each[0])[1]
 
     def exactly(self, n_segments):
@@ -518,16 +510,17 @@ class Division:
         required = sorted(self.pauses, key=self.pauses.get)
         required = required[max(len(required) - n_segments + 1, 0) :]
         while True:
-            cuts = best_segments(self._cut(self.errors, required), n_segments)
+            cuts = best_segments(self._possible(required, self.errors), n_segments)
             if cuts is not None or not required:
                 return cuts
             required = required[1:]
 
-    def _cut(self, errors, required):
-        """Errors (C, C) of the segments that have none of some cuts within; both ends count for it."""
-        kept = errors.copy()
+    def _possible(self, required, errors):
+        """Errors (C, C), `inf` where one of some cuts is within a segment; both ends count for it."""
+        count = len(self.path)
+        kept = np.full((count, count), errors)
         for cut in required:
-            if 2 <= cut <= len(errors) - 3:
+            if 2 <= cut <= count - 3:
                 kept[:cut, cut + 1 :] = np.inf
         return kept
 
