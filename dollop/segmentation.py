@@ -9,6 +9,7 @@ Symbols: C candidate cuts, d = 2 dimensions, K trajectories; G0 and G1 as in `do
 """
 
 from functools import lru_cache
+from math import prod
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from dollop.trajectory import remaining_share
 __all__ = [
     "HORIZON",
     "best_segments",
+    "cuts_within",
     "fewest_cuts",
     "fewest_segments",
     "raw_statistics",
@@ -186,13 +188,13 @@ def segment_errors(path, statistics):
     >>> bool((errors[np.isfinite(errors)] < 1e-9).all())
     True
     """
-    errors = np.full((len(path), len(path)), np.inf)
+    errors = np.full((len(path), len(path)), np.nan)
     cuts = np.arange(len(path))
-    fill_errors(errors, path, statistics, cuts, cuts, np.inf)
-    return errors
+    fill_errors(errors, path, statistics, (cuts, cuts), np.inf, room_for_responses())
+    return looked_at(errors)
 
 
-def fewest_cuts(path, statistics, tolerance):
+def fewest_cuts(path, statistics, tolerance, errors=None):
     """`fewest_segments` of all `segment_errors`, found by looking only at those that can matter.
 
     Parameters
@@ -203,6 +205,8 @@ def fewest_cuts(path, statistics, tolerance):
         (start, length) -> Statistics.
     tolerance : float
         Largest mean error of a segment, m.
+    errors : (C, C) float array, optional
+        As of `cuts_within`; by default nothing is known.
 
     Returns
     -------
@@ -222,38 +226,100 @@ def fewest_cuts(path, statistics, tolerance):
     >>> fewest_cuts(corner[::2], retimed_statistics(corner[None]), 0.01)
     array([0, 4, 8])
     """
-    cuts = divide(errors_within(path, statistics, tolerance), lambda total, k: np.isfinite(total))
-    return fewest_segments(segment_errors(path, statistics), tolerance) if cuts is None else cuts
+    errors = np.full((len(path), len(path)), np.nan) if errors is None else errors
+    impossible = errors == np.inf
+    cuts = cuts_within(path, statistics, tolerance, errors)
+    if cuts is not None:
+        return cuts
+    return fewest_segments(np.where(impossible, np.inf, segment_errors(path, statistics)), tolerance)
 
 
-def errors_within(path, statistics, tolerance):
-    """The `segment_errors` (C, C) that a division into the fewest segments can need, `inf` elsewhere.
+def cuts_within(path, statistics, tolerance, errors):
+    """As `fewest_cuts`, from what is known of the errors; what else is needed is entered there.
+
+    Parameters
+    ----------
+    path : (C, 2) float array
+        The walks' mean at the candidate cuts, m.
+    statistics : callable
+        (start, length) -> Statistics.
+    tolerance : float
+        Largest mean error of a segment, m.
+    errors : (C, C) float array
+        m; NaN where not looked at, `inf` where above the tolerance or refused. Changed in place.
+
+    Returns
+    -------
+    (S + 1,) int array or None
+        The cuts of S segments, the first 0 and the last C - 1; None if no division keeps the
+        tolerance.
+
+    Examples
+    --------
+    A segment that is refused is done without:
+
+    >>> line = np.linspace([0.0, 0.0], [4.0, 2.0], 17)
+    >>> known, asked = np.full((9, 9), np.nan), (line[::2], retimed_statistics(line[None]), 0.01)
+    >>> cuts_within(*asked, known)
+    array([0, 8])
+    >>> known[0, 8] = np.inf
+    >>> len(cuts_within(*asked, known))
+    3
+    """
+    look_within(path, statistics, tolerance, errors)
+    return divide(looked_at(errors), lambda total, k: np.isfinite(total))
+
+
+def looked_at(errors):
+    """Errors (C, C), `inf` where they are not known."""
+    return np.where(np.isnan(errors), np.inf, errors)
+
+
+def look_within(path, statistics, tolerance, errors):
+    """Enter the errors (C, C) in m that a division into the fewest segments can need.
 
     Such a division goes from every cut to one that no fewer segments reach: so first come the cuts
     that one segment within the tolerance reaches, then those that a second reaches from there.
     """
-    errors = np.full((len(path), len(path)), np.inf)
     cuts = np.arange(len(path))
-    fresh, missed = cuts[:1], cuts[1:]
+    fresh, missed, room = cuts[:1], cuts[1:], room_for_responses()
     while len(fresh) and cuts[-1] in missed:
-        fill_errors(errors, path, statistics, fresh, missed, tolerance)
+        fill_errors(errors, path, statistics, (fresh, missed), tolerance, room)
         hit = np.isfinite(errors[np.ix_(fresh, missed)]).any(axis=0)
         fresh, missed = missed[hit], missed[~hit]
-    return errors
 
 
-def fill_errors(errors, path, statistics, starts, ends, tolerance):
-    """Enter the errors in m of segments from any of `starts` to any of `ends`, where within tolerance."""
+def fill_errors(errors, path, statistics, cuts, tolerance, room):
+    """Enter the errors in m of segments between some cuts and others, `inf` where above the tolerance.
+
+    Those that are not NaN are known.
+    """
+    starts, ends = cuts
     length = ends - starts[:, None]
-    rows, columns = np.nonzero(length >= 2)
+    rows, columns = np.nonzero((length >= 2) & np.isnan(errors[np.ix_(starts, ends)]))
     order = np.argsort(length[rows, columns], kind="stable")
     start, end = starts[rows[order]], ends[columns[order]]
     for k in range(0, len(order), AT_ONCE):
         some = start[k : k + AT_ONCE], end[k : k + AT_ONCE]
-        errors[some] = errors_of_some(path, statistics, *some, tolerance)
+        errors[some] = errors_of_some(path, statistics, *some, tolerance, room)
 
 
-def errors_of_some(path, statistics, start, end, tolerance):
+def room_for_responses():
+    """Room for one lot of responses after the other: states, and vertices in single precision.
+
+    Asked of the system anew for each lot, and given back, it would take a tenth of the search.
+    """
+    states, vertices = (each * (HORIZON + 2) * AT_ONCE for each in (2, 3))
+    room = np.empty(states + (vertices + 1) // 2)
+    return room[:states], room[states:].view(np.float32)
+
+
+def part_of(room, *shape):
+    """An array of that shape at the beginning of a room."""
+    return room[: prod(shape)].reshape(shape)
+
+
+def errors_of_some(path, statistics, start, end, tolerance, room):
     """Errors (B,) in m of segments from start to end (B,), `inf` where their mean exceeds the tolerance.
 
     Few cuts all over a segment are looked at first, then as many again, and so on; but no more
@@ -261,8 +327,10 @@ def errors_of_some(path, statistics, start, end, tolerance):
     """
     length, columns = end - start, np.ascontiguousarray(path.T)
     goals = columns.take(end, axis=1)
-    polylines = candidate_responses(statistics(start, length), columns.take(start, axis=1) - goals)
-    vertices, order = lifted_vertices(polylines), spread_order(len(path))
+    size, offsets = (HORIZON + 2, len(start)), columns.take(start, axis=1) - goals
+    polylines = candidate_responses(statistics(start, length), offsets, part_of(room[0], 2, *size))
+    vertices = lifted_vertices(polylines, part_of(room[1], size[1], 3, size[0]))
+    order = spread_order(len(path))
     total, left, seen, enough = np.zeros(len(start)), np.arange(len(start)), 0, FIRST_LOOK
     while len(left):
         cuts = start[left, None] + order[length[left], seen : min(enough, length[left].max() - 1)]
@@ -288,7 +356,7 @@ def spread_order(count):
     return order
 
 
-def candidate_responses(statistics, x0):
+def candidate_responses(statistics, x0, out=None):
     """Responses (2, HORIZON + 2, B) from offsets x0 (2, B), up to the subgoal at 0.
 
     Slow systems are shown by every m-th state, m a power of two such that the response settles
@@ -299,11 +367,11 @@ def candidate_responses(statistics, x0):
     step = componentwise_matrix(statistics)
     for k in range(doublings.max()):
         step = np.where(k < doublings, product(step, step), step)
-    states, known = np.zeros((2, HORIZON + 2, x0.shape[1])), 1
-    states[:, 0] = x0
+    states, known = np.empty((2, HORIZON + 2, x0.shape[1])) if out is None else out, 1
+    states[:, 0], states[:, -1] = x0, 0
     while known <= HORIZON:
         more = min(known, HORIZON + 1 - known)
-        states[:, known : known + more] = product(step, states[:, :more])
+        product(step, states[:, :more], states[:, known : known + more])
         step, known = product(step, step), known + more
     return states
 
@@ -315,17 +383,23 @@ def componentwise_matrix(statistics):
     return product(G1, adjugate) / (G0[0, 0] * G0[1, 1] - G0[0, 1] * G0[1, 0])
 
 
-def product(A, B):
+def product(A, B, out=None):
     """A B of matrices (2, 2, ...) and (2, m, ...), components first."""
-    AB = A[:, :1] * B[:1]
+    AB = np.multiply(A[:, :1], B[:1], out=out)
     AB += A[:, 1:] * B[1:]
     return AB
 
 
-def lifted_vertices(polylines):
+def lifted_vertices(polylines, out=None):
     """-2 v and |v|^2 of the vertices v of polylines (2, V, B), as (B, 3, V): for `nearest_vertices`."""
-    v = polylines.transpose(2, 0, 1).astype(np.float32, order="C")
-    return np.concatenate([-2 * v, v[:, :1] * v[:, :1] + v[:, 1:] * v[:, 1:]], axis=1)
+    count, many = polylines.shape[1:]
+    lifted = np.empty((many, 3, count), np.float32) if out is None else out
+    np.multiply(polylines.transpose(2, 0, 1), -2, out=lifted[:, :2], casting="same_kind")
+    x, y, square = lifted.transpose(1, 0, 2)
+    np.multiply(x, x, out=square)
+    square += y * y
+    square *= 0.25
+    return lifted
 
 
 def nearest_vertices(points, lifted):

@@ -11,6 +11,7 @@ from dollop.lds import LDS, Statistics
 from dollop.segmentation import (
     best_segments,
     candidate_responses,
+    cuts_within,
     distances,
     fewest_cuts,
     fewest_segments,
@@ -145,3 +146,16 @@ def test_looking_only_at_what_matters_changes_no_cut(seed, retimed):
         except ValueError as refusal:
             found.append(str(refusal))
     assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_is_refused_one_after_the_other_is_done_without(seed):
+    """From what earlier searches knew, the cuts are those of all errors without the segments refused since."""
+    rng = np.random.default_rng(seed)
+    path, statistics = search_input([rng.normal(size=(40, 2)).cumsum(axis=0)], 30)
+    every, known = segment_errors(path, statistics), np.full((30, 30), np.nan)
+    for _ in range(6):
+        cuts = cuts_within(path, statistics, 1.5, known)
+        assert cuts.tolist() == fewest_segments(every, 1.5).tolist()
+        k = rng.integers(len(cuts) - 1)
+        every[cuts[k], cuts[k + 1]] = known[cuts[k], cuts[k + 1]] = np.inf

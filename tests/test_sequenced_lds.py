@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from walks import any_walk, moving, walk_figure_eights
 
 from dollop.laps import laps
+from dollop.law.timing import turns_at
 from dollop.lds import LDS
 from dollop.sequenced_lds import SequencedLDS
-from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory
+from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory, resample
 
 
 @pytest.fixture(scope="module")
@@ -214,6 +215,21 @@ def test_the_tolerance_that_can_be_kept_is_kept(one_lap):
     SequencedLDS.fit(one_lap, tolerance=1.01 * least, candidates=50)
     with pytest.raises(ValueError, match="cannot be kept"):
         SequencedLDS.fit(one_lap, tolerance=0.98 * least, candidates=50)
+
+
+@pytest.mark.parametrize("seed", [3, 22])
+def test_a_division_that_never_ends_keeps_the_tolerance_and_is_always_the_same(seed):
+    """Loops of decimetres turn too far at a hand-over, whatever the cuts; the law is within the tolerance."""
+    smooth = np.hanning(23)[1:-1] / np.hanning(23).sum()
+    steps = np.random.default_rng(seed).normal(size=(2, 160))
+    velocity = np.stack([np.convolve(each, smooth, "same") for each in steps], axis=1)
+    walk = (0.06 * velocity / np.linalg.norm(velocity, axis=1).mean()).cumsum(axis=0)
+    one, other = (SequencedLDS.fit(walk) for _ in range(2))
+    ends = np.cumsum([line.way[-1] for line in one.lines()])
+    turns = turns_at(np.vstack([line.places for line in one.lines()]), ends)
+    assert np.degrees(turns[~one.corners].max()) > 45  # who turns so far where he walks has a corner
+    assert np.array_equal(one.response(), other.response())
+    assert one.error(resample(walk, 100)) <= 0.02
 
 
 @pytest.mark.parametrize("fit", [LDS.fit, SequencedLDS.fit])

@@ -30,12 +30,12 @@ continuous. It still passes every subgoal.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp
+from math import exp, hypot
 
 import numpy as np
 
 from dollop.lds import powers_on
-from dollop.trajectory import arc_length, at_arc_length
+from dollop.trajectory import arc_length
 
 __all__ = ["FADE", "Fading", "Line", "lines_of"]
 
@@ -48,6 +48,7 @@ push at one object would not be over at the next."""
 PARTS = 64  # of a segment's way, no place being farther from the next: 4 cm of 3 m
 ROUNDED = 1 / 3  # of a segment's way at each of its ends, where the line is rounded
 AROUND = 0.04  # share of the way over which the direction is measured where the rounding begins
+BEGINS = 1 - ROUNDED + AROUND * np.array([-1.0, 0.0, 1.0])
 BULGE = 1 + 2**0.5  # the least curvature, in 1 / length, that turns an end by 1 rad and comes back
 
 
@@ -100,8 +101,10 @@ class Line:
         """
         states = np.vstack([states_to(lds, start, reach), lds.goal])
         way = arc_length(states)
-        counts = np.ceil(PARTS * np.diff(way) / max(way[-1], reach)).astype(int).clip(1)
-        steps = np.concatenate([n + np.arange(each) / each for n, each in enumerate(counts)])
+        counts = np.ceil(PARTS * (way[1:] - way[:-1]) / max(way[-1], reach)).astype(int).clip(1)
+        ends = counts.cumsum()
+        after = np.arange(ends[-1]) - (ends - counts).repeat(counts)
+        steps = np.arange(len(counts)).repeat(counts) + after / counts.repeat(counts)
         steps = np.append(steps, len(counts))
         return cls(curve(states, steps), steps, lds.A, abs(float(lds.statistics.decay)))
 
@@ -304,10 +307,8 @@ def rounded(before, after):
     first, second = Half.of(before.places), Half.of(after.places[::-1])
     if first is None or second is None:
         return before, after
-    (one, bend), (other, bend_after) = (each.end for each in (first, second))
-    weights = np.array([1 / first.length, 1 / second.length])
-    turn = (bend_after - bend) / BULGE + weights[0] * one - weights[1] * other
-    direction = turn / weights.sum()
+    turn = (second.bend - first.bend) / BULGE + first.end / first.length - second.end / second.length
+    direction = turn / (1 / first.length + 1 / second.length)
     places = first.places(direction), second.places(-direction)[::-1]
     return replace(before, places=places[0]), replace(after, places=places[1])
 
@@ -320,47 +321,53 @@ class Half:
     ----------
     line : (V, 2) float array
         m.
+    way : (V,) float array
+        Along it, m.
     place, direction : (2,) float arrays
         Where the rounding begins, m, and the unit vector of the line there.
+    length : float
+        Distance from the place to the subgoal, m.
     """
 
     line: np.ndarray
+    way: np.ndarray
     place: np.ndarray
     direction: np.ndarray
+    length: float
 
     @classmethod
     def of(cls, line):
         """The half of a line; None where it is too short to have a direction."""
-        length = arc_length(line)[-1]
-        at = length * (1 - ROUNDED + AROUND * np.array([-1.0, 0.0, 1.0]))
-        if not length > 0:
+        way = arc_length(line)
+        if not way[-1] > 0:
             return None
-        tail, place, head = at_arc_length(line, at)
-        size = np.hypot(*(head - tail))
-        if min(size, np.hypot(*(line[-1] - place))) < 1e-9 * length:
+        at = way[-1] * BEGINS
+        places = (np.interp(at, way, column).tolist() for column in line.T)
+        (tail, x, head), (tail_y, y, head_y) = places
+        size, length = hypot(head - tail, head_y - tail_y), hypot(line[-1, 0] - x, line[-1, 1] - y)
+        if min(size, length) < 1e-9 * way[-1]:
             return None
-        return cls(line, place, (head - tail) / size)
+        direction = np.array([(head - tail) / size, (head_y - tail_y) / size])
+        return cls(line, way, np.array([x, y]), direction, length)
 
-    @property
-    def length(self):
-        """Distance in m from the place to the subgoal."""
-        return float(np.hypot(*(self.line[-1] - self.place)))
+    @cached_property
+    def bend(self):
+        """(2,) float array: of the parabola, 1/m."""
+        return 2 * ((self.line[-1] - self.place) / self.length - self.direction) / self.length
 
     @property
     def end(self):
-        """The direction (2,) in which the parabola comes to the subgoal, and its bend (2,), 1/m."""
-        bend = 2 * ((self.line[-1] - self.place) / self.length - self.direction) / self.length
-        return self.direction + self.length * bend, bend
+        """(2,) float array: the direction in which the parabola comes to the subgoal."""
+        return self.direction + self.length * self.bend
 
     def places(self, direction):
         """The line (V, 2), rounded so that it comes to the subgoal in a direction (2,)."""
-        way, (end, bend) = arc_length(self.line), self.end
-        left = (way[-1] - way) / (ROUNDED * way[-1])
-        rows = left < 1
-        u = left[rows, None]
+        left = (self.way[-1] - self.way) / (ROUNDED * self.way[-1])
+        first = len(left) - int(np.searchsorted(left[::-1], 1.0))
+        u = left[first:, None]
         t = self.length * (1 - u)
         bulge = np.where(u < 0.5**0.5, u - BULGE / 2 * u**2, BULGE / 2 * (1 - u) ** 2)
         places = self.line.copy()
-        places[rows] = self.place + t * self.direction + t**2 * bend / 2
-        places[rows] -= self.length * bulge * (direction - end)
+        places[first:] = self.place + t * self.direction + t**2 * (self.bend / 2)
+        places[first:] -= bulge * (self.length * (direction - self.end))
         return places

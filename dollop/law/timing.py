@@ -166,8 +166,9 @@ def turns_at(path, ways):
     >>> np.degrees(turns_at(path, np.array([0.5, 1.0, 2.0]))).round()
     array([ 0., 90.,  0.])
     """
-    places = [at_arc_length(path, ways + shift) for shift in (-OVER, 0.0, OVER)]
-    arriving, going_on = np.diff(places, axis=0) @ (1, 1j)
+    at = np.concatenate([ways - OVER, ways, ways + OVER])
+    places = (at_arc_length(path, at) @ (1, 1j)).reshape(3, -1)
+    arriving, going_on = places[1] - places[0], places[2] - places[1]
     inner = np.minimum(np.abs(arriving), np.abs(going_on)) > 1e-6  # at an end rounding has the say
     return np.where(inner, np.abs(np.angle(going_on * arriving.conj())), 0.0)
 
