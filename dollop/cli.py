@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import dollop
-from dollop.formats.files import check_writable, whole_file
+from dollop.formats.writing import check_writable, whole_file
 from dollop.gridmap import check_is_map
 from dollop.people import moving_speed
 from dollop.trajectory import arc_length

@@ -9,7 +9,7 @@ import numpy as np
 from dollop.association import Association, associate, layout_turn
 from dollop.checks import Note, check_choice, put_in, trusted
 from dollop.environment import Environment
-from dollop.formats.files import whole_file
+from dollop.formats.writing import whole_file
 from dollop.laps import cut_laps
 from dollop.learning.anchored import learn_anchored, tied_to_corners, told_of_places
 from dollop.learning.matchings import composed, inverse, matched_to, matchings_into, notes_of

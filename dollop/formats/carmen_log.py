@@ -13,9 +13,10 @@ from functools import partial
 import numpy as np
 
 from dollop.checks import check_positive, checked_array, checked_number
-from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
+from dollop.formats.files import FormatError, from_file, read_bytes
 from dollop.formats.odometry import Odometry
 from dollop.formats.scans import Beams, Scan, doubtful, forgive, forgive_disorder, no_return_from, usable_scans
+from dollop.formats.writing import whole_file
 from dollop.laser import LaserLog
 from dollop.pose import wrapped
 

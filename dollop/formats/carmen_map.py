@@ -6,7 +6,8 @@ import struct
 import numpy as np
 
 from dollop.checks import checked_array
-from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
+from dollop.formats.files import FormatError, from_file, read_bytes
+from dollop.formats.writing import whole_file
 
 __all__ = ["OCCUPIED_FROM", "read_map", "write_map"]
 

@@ -12,7 +12,8 @@ from PIL import Image
 
 from dollop.checks import check_choice
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
+from dollop.formats.files import FormatError, from_file, read_bytes
+from dollop.formats.writing import whole_file
 
 __all__ = ["read_map", "write_map"]
 

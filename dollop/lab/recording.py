@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from dollop.formats.files import FormatError, whole_file
+from dollop.formats.files import FormatError
 from dollop.formats.logs import read_log, write_log
+from dollop.formats.writing import whole_file
 from dollop.lab.scenes import Scene
 from dollop.laser import LaserLog
 

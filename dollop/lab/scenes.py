@@ -11,7 +11,8 @@ from functools import partial
 import numpy as np
 
 from dollop.checks import checked_numbers, put_in
-from dollop.formats.files import FormatError, from_file, read_bytes, whole_file
+from dollop.formats.files import FormatError, from_file, read_bytes
+from dollop.formats.writing import whole_file
 from dollop.lab.outlines import Outline, gaps
 from dollop.lab.person import SHOULDERS
 from dollop.lab.rooms import LABORATORY, Part, Room

@@ -12,8 +12,8 @@ import numpy as np
 from dollop import lab
 from dollop.checks import need
 from dollop.environment import corner_indices
-from dollop.formats.files import check_writable
 from dollop.formats.logs import write_log
+from dollop.formats.writing import check_writable
 from dollop.gridmap import OccupancyGrid
 from dollop.matching import match
 from dollop.observation import observe

@@ -15,7 +15,8 @@ import pandas as pd
 from scipy import stats
 
 from dollop.checks import need
-from dollop.formats.files import FormatError, check_writable, whole_file
+from dollop.formats.files import FormatError
+from dollop.formats.writing import check_writable, whole_file
 from dollop.replication.claims import CLAIMS
 from dollop.replication.claims.observing import choose_noises
 from dollop.replication.running import as_json, going_on_in, put_between_marks, report_beside, run_all

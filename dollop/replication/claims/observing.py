@@ -17,7 +17,7 @@ import joblib
 import numpy as np
 
 from dollop.foreground import near_together, seen_free
-from dollop.formats.files import whole_file
+from dollop.formats.writing import whole_file
 from dollop.lab.person import smooth_path, walk
 from dollop.laser import LaserLog
 from dollop.observation import observe

@@ -15,7 +15,8 @@ from tqdm import tqdm
 
 from dollop import plot
 from dollop.checks import need
-from dollop.formats.files import FormatError, check_writable, whole_file
+from dollop.formats.files import FormatError
+from dollop.formats.writing import check_writable, whole_file
 from dollop.replication import gallery
 from dollop.replication.figures import environment, learning, moved, observing, performing  # noqa: F401
 from dollop.replication.figures.panel import PANELS

@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 
 from dollop.checks import need
-from dollop.formats.files import FormatError, check_writable, whole_file
+from dollop.formats.files import FormatError
+from dollop.formats.writing import check_writable, whole_file
 from dollop.replication.running import as_json, going_on_in, put_between_marks, report_beside, run_all
 from dollop.replication.worlds.chain import CAUSES, COLUMNS, OUTCOMES, judge
 from dollop.replication.worlds.draw import KINDS, draw
