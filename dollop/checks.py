@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from importlib.util import find_spec
+from reprlib import Repr
 
 import numpy as np
 
 __all__ = [
     "EXTRAS",
+    "LONGEST",
     "Note",
     "check_choice",
     "check_positive",
@@ -16,11 +18,84 @@ __all__ = [
     "checked_positions",
     "need",
     "put_in",
+    "shortened",
+    "told",
     "trusted",
 ]
 
 FARTHEST = 1e9
 """m from the origin: coordinates beyond are no metres, and their squares would overflow."""
+
+
+LONGEST = 300
+"""Characters of a message, whatever it tells of."""
+
+
+class _Told(Repr):
+    """Values as they are told: never longer than a line, and never made longer than that either."""
+
+    def repr_int(self, value, level):
+        """A whole number; Python refuses to write one of thousands of digits."""
+        digits = int(value.bit_length() * 0.30103) + 1
+        return f"a whole number of some {digits} digits" if digits > 25 else repr(value)
+
+    def repr_bytes(self, value, level):
+        """The beginning of bytes."""
+        return self.repr_str(value, level)
+
+
+_REPR = _Told()
+_REPR.maxlevel, _REPR.maxstring, _REPR.maxother = 3, 45, 60
+
+
+def told(value, most=60):
+    """A value as a message tells it: its repr, or so much of that as there is room for.
+
+    Parameters
+    ----------
+    value : object
+        Anything: no more of it is written out than is told.
+    most : int
+        Characters.
+
+    Returns
+    -------
+    str
+        One line.
+
+    Examples
+    --------
+    >>> told([1.5, "a"]), told(10**400), told("x" * 10**7)
+    ("[1.5, 'a']", 'a whole number of some 401 digits', "'xxxxxxxxxxxxxxxxxxxx...xxxxxxxxxxxxxxxxxxxx'")
+    """
+    return shortened(_REPR.repr(value), most)
+
+
+def shortened(text, most=LONGEST):
+    """A text as one line of at most so many characters, its middle left out if it has more.
+
+    Parameters
+    ----------
+    text : str
+    most : int
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> shortened("a rule that nobody will ever read to its very end", 20)
+    'a rule th ... ry end'
+    """
+    if len(text) > 4 * most:  # whatever came in, no more of it is gone through
+        text = text[: 2 * most] + text[-2 * most :]
+    line = " ".join(text.split())
+    line = line if line.isprintable() else "".join(c if c.isprintable() else "?" for c in line)
+    if len(line) <= most:
+        return line
+    tail = (most - 5) * 2 // 5
+    return f"{line[: most - 5 - tail]} ... {line[-tail:]}"
 
 
 def check_positive(name, value, or_zero=False):

@@ -6,7 +6,9 @@ import sys
 import warnings
 import zlib
 
-__all__ = ["FormatError", "from_file", "read_bytes", "warn_of"]
+from dollop.checks import LONGEST, shortened
+
+__all__ = ["FormatError", "from_file", "of_file", "read_bytes", "warn_of"]
 
 MAX_BYTES = 1 << 30
 """The most that is read of one file, unpacked: a small gzip can hold anything."""
@@ -14,6 +16,8 @@ MAX_BYTES = 1 << 30
 
 class FormatError(ValueError):
     """A file that cannot be read as what its name says, by the sources of CARMEN and ROS.
+
+    What it says is one line of at most 300 characters, whatever came in.
 
     Parameters
     ----------
@@ -30,7 +34,26 @@ class FormatError(ValueError):
 
     def __str__(self):
         message, path, line = self.args
-        return f"{path}: {message}" if line is None else f"{path}, line {line}: {message}"
+        place = path if line is None else f"{path}, line {line}"
+        return of_file(place, message)
+
+
+def of_file(place, message):
+    """A message of a file, no longer than any: what is wrong keeps more of its room than the name.
+
+    Parameters
+    ----------
+    place : str or Path
+        The file, with the line if it is known.
+    message : str
+        What is wrong.
+
+    Returns
+    -------
+    str
+    """
+    message = shortened(message, LONGEST * 3 // 5)
+    return f"{shortened(str(place), LONGEST - 2 - len(message))}: {message}"
 
 
 def from_file(path, make, *content):
@@ -80,7 +103,7 @@ def warn_of(path, text):
     frame, depth = sys._getframe(), 1
     while frame.f_back and frame.f_globals.get("__name__", "").startswith("dollop."):
         frame, depth = frame.f_back, depth + 1
-    warnings.warn(f"{path}: {text}", stacklevel=depth)
+    warnings.warn(of_file(path, text), stacklevel=depth)
 
 
 def read_bytes(path):

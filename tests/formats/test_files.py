@@ -70,3 +70,12 @@ def test_an_error_survives_the_way_between_processes():
     for error in (FormatError("too short", "a.log"), FormatError("too short", Path("a.log"), 3)):
         assert str(pickle.loads(pickle.dumps(error))) == str(error)
     assert str(error) == "a.log, line 3: too short"
+
+
+@pytest.mark.parametrize("path", ["walk.log", "deep/" * 300 + "walk.log"])
+@pytest.mark.parametrize("message", ["x must be 1", "x must be 1, got " + "9\n" * 10**6 + " of y"])
+def test_a_message_has_at_most_300_characters(path, message):
+    """Whatever came in: it is one line, which begins with the rule and ends with what was wrong."""
+    told = str(FormatError(message, path, 10**7))
+    assert len(told) <= 300 and "\n" not in told
+    assert "walk.log, line 10000000: x must be 1" in told and told[-4:] == message[-4:]
