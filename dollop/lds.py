@@ -24,8 +24,8 @@ STEPS, DECAY = 40, 3.0
 """A re-timed segment: its steps, and the time constants over which it decays."""
 
 MOST_STEPS = 100_000
-"""Steps of a response: one that keeps 0.9997 of its offset at each comes from 1e9 m to a micrometre in so
-many, and what is shown decays within some forty by e^3."""
+"""Steps of a response: one that keeps 0.9997 of its offset at each comes from 1e9 m to a micrometre
+in so many, and what is shown decays within some forty by e^3."""
 
 NOTHING = 1e-18
 """m^2: a squared length that counts as zero."""
@@ -258,7 +258,8 @@ class LDS:
         True
         """
         if not 0 <= n <= MOST_STEPS or n != int(n):
-            raise ValueError(f"n must be a whole number of steps from 0 on, at most {MOST_STEPS}, got {told(n)}")
+            rule = f"n must be a whole number of steps from 0 on, at most {MOST_STEPS}"
+            raise ValueError(f"{rule}, got {told(n)}")
         return self.goal + powers_on(self.A, check_states(x0) - self.goal, int(n))
 
     def lyapunov(self, x):

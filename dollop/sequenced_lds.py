@@ -328,7 +328,7 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            A period that is not positive, or so short that there would be more than a million times.
+            A period that is not positive, or that makes more than a million times.
 
         Examples
         --------

@@ -76,8 +76,8 @@ KERNEL = np.array([[-1.0], [0.0], [1.0]]) * np.ones((1, 3))
 BORDER = 1.0
 """m round the map where beams may end."""
 TILE, HALO = 1024, 2.0
-"""Cells along a side of the parts of a large map that are made ready when a beam ends there, and how many m
-round each count for it: ten standard deviations of the widest field, so that nothing farther pulls."""
+"""Cells along a side of the parts of a large map that are made ready when a beam ends there, and how
+many m round each count: ten standard deviations of the widest field, so that nothing farther pulls."""
 
 
 def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
@@ -296,7 +296,8 @@ class _Search:
 
     def _drawn(self, scan):
         """Poses (N, 3) of the lattice that explain a scan best, one of each surroundings."""
-        chosen, scores = self._follower.lattice_scores(self._scans.ends[scan][self._scans.back[scan]][::2])
+        ends = self._scans.ends[scan][self._scans.back[scan]]
+        chosen, scores = self._follower.lattice_scores(ends[::2])
         best = np.argpartition(-scores, min(BEST, len(scores)) - 1)[:BEST]
         best = best[np.lexsort([best, -scores[best]])]
         poses, candidates = self._follower.lattice_poses(chosen[best]), []
@@ -480,8 +481,8 @@ class _Springs:
     """Of each place on the map: half the squared distance to the nearest surface, its slope, and the normal.
 
     The normal is smoothed, as the outer product of the slopes of q with itself, so that there is one on
-    the surface too. Of a map that is larger than a tile only those tiles are made in which a beam ends:
-    24 bytes a cell.
+    the surface too. Of a map that is larger than a tile only those tiles are made in which a beam
+    ends: 24 bytes a cell.
     """
 
     def __init__(self, background):
@@ -491,7 +492,7 @@ class _Springs:
             (background.origin, background.resolution),
         )
         self._shape = np.add(self._occupancy.shape, 2 * self._border)
-        self._tiles = -(-(self._shape - 1) // TILE)  # the last row and column belong to the tile before
+        self._tiles = -(-(self._shape - 1) // TILE)  # each has a row and column of the next
         self._sides = np.minimum(self._shape, TILE + 1)
         self._made = np.zeros(np.prod(self._tiles), bool)
         self._table = np.empty((len(self._made) * np.prod(self._sides), 6), np.float32)
@@ -532,11 +533,11 @@ class _Springs:
         self._made[number] = True
 
     def _window(self, low, high):
-        """Occupancy from one row and column up to others, 0 round the map and where it is not known."""
-        shape = self._occupancy.shape
-        first, last = ((each - self._border).clip(0, shape) for each in (low, high))
+        """Occupancy from one row and column up to others, 0 round the map and where unknown."""
+        low, high = low - self._border, high - self._border
+        first, last = (each.clip(0, self._occupancy.shape) for each in (low, high))
         inside = np.nan_to_num(self._occupancy[first[0] : last[0], first[1] : last[1]])
-        return np.pad(inside, np.column_stack([first + self._border - low, high - self._border - last]))
+        return np.pad(inside, np.column_stack([first - low, high - last]))
 
 
 def _springs_of(occupancy, resolution):
