@@ -36,6 +36,8 @@ _CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
 # The ceiling would make 1 of a rounding error of 1e-13: changes of force below this many units
 # count as none.
 _ROUNDING = 1e-6
+# Those of 500 objects: their springs take 250 MB.
+MOST_CORNERS = 2000
 
 
 LINK, SPACINGS = 0.15, 2.2
@@ -230,7 +232,7 @@ def spring_constants(corners):
     Raises
     ------
     ValueError
-        Where two corners coincide: their spring would be infinite.
+        Where two corners coincide: their spring would be infinite. More than 2000 corners.
 
     Examples
     --------
@@ -258,7 +260,7 @@ def spring_forces(corners):
     Raises
     ------
     ValueError
-        Where two corners coincide.
+        Where two corners coincide. More than 2000 corners.
 
     Examples
     --------
@@ -307,6 +309,8 @@ def integer_costs(corners_i, corners_j, alpha=1e3):
 def _springs(corners):
     """Spring constants (C, C) and differences omega_n - omega_m (C, C, 2) between corners."""
     corners = np.asarray(corners, dtype=float)
+    if len(corners) > MOST_CORNERS:
+        raise ValueError(f"springs must be between at most {MOST_CORNERS} corners, got {len(corners)}")
     differences = corners - corners[:, None]
     squares = np.einsum("mnd,mnd->mn", differences, differences)
     np.fill_diagonal(squares, np.inf)

@@ -64,6 +64,7 @@ _KAPPA = 1.0  # of the turns, von Mises: small ones are a little likelier
 _NARROWEST = 5.0  # m, side of a room
 _WHERETO = np.linspace(-2, 2, 9)  # standard deviations by which an object may have been moved
 
+MOST_OBJECTS = 500
 _EXACT = 12  # up to so many objects all matchings are summed
 _STARTS = 8  # so many of the alignments that fit best are refined, in so many steps
 _STEPS = 6
@@ -210,7 +211,8 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     Parameters
     ----------
     environment_i, environment_j : Environment
-        Any number of objects. With "literal" at least two each.
+        At most 500 objects each: matching them takes some seconds and 700 MB. With "literal" at
+        least two each.
     method : {"robust", "literal"}
         "robust" compares the layouts and the sizes of the objects, knows what could be seen, and
         takes the corners from that; objects may be missing, added or split. "literal" is the
@@ -227,7 +229,8 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     Raises
     ------
     ValueError
-        With "literal": fewer than two objects, different counts, or corners that coincide.
+        More than 500 objects. With "literal": fewer than two, different counts, or corners that
+        coincide.
 
     Examples
     --------
@@ -245,6 +248,9 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     """
     check_choice("method", method, ("robust", "literal"))
     check_positive("moved", moved)
+    most = max(len(environment_i), len(environment_j))
+    if most > MOST_OBJECTS:
+        raise ValueError(f"environments to match must have at most {MOST_OBJECTS} objects, got {most}")
     if method == "robust":
         return _match_robustly(environment_i, environment_j, moved)
     counts = f"{len(environment_i)} and {len(environment_j)}"
