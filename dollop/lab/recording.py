@@ -10,8 +10,9 @@ from pathlib import Path
 import pandas as pd
 
 from dollop.formats.files import FormatError
+from dollop.formats.kinds import TRUTH
 from dollop.formats.logs import read_log, write_log
-from dollop.formats.writing import whole_file
+from dollop.formats.writing import together, whole_file
 from dollop.lab.scenes import Scene
 from dollop.laser import LaserLog
 
@@ -49,19 +50,25 @@ class Recording:
         return f"Recording: {self.log}; {self.scene}"
 
     def save(self, path):
-        """Write the log, and beside it the truth and the scene.
+        """Write the log, and beside it the truth and the scene: all of them, or none.
 
         Parameters
         ----------
         path : str or Path
             Of a CARMEN log, .log or .log.gz. For `walk.log.gz` the others are `walk_truth.csv` and
             `walk_scene.json`.
+
+        Raises
+        ------
+        OSError
+            Where a file cannot be written, or what is there is of another kind.
         """
-        write_log(path, self.log)
         truth, scene = companions(path)
-        with whole_file(truth, "w") as stream:
-            self.truth.to_csv(stream, index=False, float_format="%.4f")
-        self.scene.save(scene)
+        with together():
+            with whole_file(truth, "w", TRUTH) as stream:
+                self.truth.to_csv(stream, index=False, float_format="%.4f")
+            self.scene.save(scene)
+            write_log(path, self.log)
 
     @classmethod
     def load(cls, path):

@@ -13,8 +13,8 @@ from dollop import lab
 from dollop.checks import need
 from dollop.environment import corner_indices
 from dollop.formats.logs import write_log
-from dollop.formats.writing import check_writable
-from dollop.gridmap import OccupancyGrid
+from dollop.formats.writing import check_outputs, together
+from dollop.gridmap import OccupancyGrid, map_outputs
 from dollop.matching import match
 from dollop.observation import observe
 from dollop.replication.runs import free_poses
@@ -46,6 +46,9 @@ of Sec. II swallows what is nearer. A layout without room for that is drawn anew
 def save_all(folder):
     """Simulate and save every recording that the notebooks read.
 
+    A recording and its truth and scene are written together, and so are the map and the log that it
+    is made from: after a kill each is of the old run or of the new one.
+
     Parameters
     ----------
     folder : str or Path
@@ -66,9 +69,11 @@ def save_all(folder):
     need("lab")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    check_writable(folder / "lab.yaml")
-    write_log(folder / "empty_lab.log.gz", empty_lab())
-    background_map().save(folder / "lab.yaml")
+    check_outputs(map_outputs(folder / "lab.yaml"))
+    log, background = empty_lab(), background_map()
+    with together():
+        background.save(folder / "lab.yaml")
+        write_log(folder / "empty_lab.log.gz", log)
     recordings = {"figure_eights": figure_eights().recording, "moved_cones": moved_cones()}
     recordings |= {f"slalom_{k}": slalom(k).recording for k in (0, 1)}
     recordings |= {f"moved_cans_{k}": moved_cans(k) for k in range(len(LAYOUTS))}
