@@ -14,6 +14,7 @@ from dollop.checks import check_positive, checked_array, put_in
 from dollop.formats import carmen_map, ros_bag
 from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, from_file
+from dollop.formats.writing import checked_path
 
 __all__ = [
     "OccupancyGrid", "check_is_map", "covered_cells", "flat_cells", "in_cells", "in_metres", "map_inputs",
@@ -365,7 +366,7 @@ def check_is_map(path):
     FormatError
         If it ends neither in `.yaml` or `.yml` (ROS) nor in `.map` (CARMEN).
     """
-    if Path(path).suffix not in (".map", ".yaml", ".yml"):
+    if checked_path(path).suffix not in (".map", ".yaml", ".yml"):
         raise FormatError("a map is named .yaml (ROS) or .map (CARMEN)", path)
 
 

@@ -44,7 +44,7 @@ TASK = Kind("a task", rb'\A\s*\{[^{}\[\]]*"format":\s*"dollop task"')
 SCENE = Kind("a scene", rb'\A\s*\{[^{}\[\]]*"format":\s*"dollop scene"')
 TRAJECTORY = Kind("a trajectory", rb"\At,x,y,occluded\r?\n")
 EVERYBODY = Kind("a table of everybody's trajectories", rb"\At,x,y,occluded,person\r?\n")
-TRUTH = Kind("the truth of a recording", rb"\At(?:," + _MOVING + rb")*\r?\n")
+TRUTH = Kind("the truth of a recording", rb"\A(?=.*(?:heading|object_x|laser_x))t(?:," + _MOVING + rb")+\r?\n")
 _BAG = Kind("a ROS bag", rb"\A(?:#ROSBAG|\x89MCAP|SQLite format 3)")
 
 _KNOWN = CARMEN_LOG, CARMEN_MAP, PGM, PNG, TASK, SCENE, TRAJECTORY, EVERYBODY, TRUTH, _BAG, ROS_MAP

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from dollop.checks import shortened
+from dollop.checks import shortened, told
 from dollop.formats.kinds import PGM, PNG, Kind, check_is_nobodys, check_replaceable
 
 try:
@@ -24,7 +24,7 @@ try:
 except ImportError:  # a system without, such as Windows
     fcntl = None
 
-__all__ = ["Output", "check_outputs", "check_writable", "together", "whole_file"]
+__all__ = ["Output", "check_outputs", "check_writable", "checked_path", "together", "whole_file"]
 
 PART = re.compile(r"\.dollop-[0-9a-f]{16}\.part")
 STALE = 86_400.0
@@ -46,6 +46,27 @@ class Output(NamedTuple):
     path: object
     kind: Kind = None
     of: object = None
+
+
+def checked_path(path):
+    """A path, if that is what it is: to `open` a number is a file that is open already.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ValueError
+        If it is neither, or holds a zero byte.
+    """
+    if not isinstance(path, str | os.PathLike) or "\0" in os.fsdecode(path):
+        raise ValueError(f"a path must be a str or Path without zero bytes, got {told(path)}")
+    return Path(path)
 
 
 def check_outputs(outputs, inputs=()):
@@ -98,7 +119,7 @@ def check_writable(path, kind=None, of=None):
 
     Raises
     ------
-    OSError
+    ValueError, OSError
         As `whole_file`.
     """
     part, stream = _begin(path, "wb", kind, of)
@@ -178,6 +199,8 @@ def whole_file(path, mode="wb", kind=None, of=None):
 
     Raises
     ------
+    ValueError
+        If the path is none.
     OSError
         If it cannot be written: there is no such folder or no room, or what bears the name is no
         ordinary file, may not be written, has other names (hard links, of which one would be cut
@@ -226,7 +249,7 @@ class _Part(NamedTuple):
 def _begin(path, mode, kind, of):
     """A neighbour of a file that may be written, and its stream."""
     try:
-        target = os.path.realpath(path)
+        target = os.path.realpath(checked_path(path))
         before = _replaced(target, kind)
         if kind in (PGM, PNG):
             check_is_nobodys(target, of)
