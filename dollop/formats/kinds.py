@@ -100,7 +100,7 @@ def check_is_nobodys(picture, of=None):
     names_it = rb"(?m)\bimage\b[^\n]*[\s/\"':]" + name + rb"(?:[\s\"',}#]|\Z)"
     for other in sorted((*picture.parent.glob("*.yaml"), *picture.parent.glob("*.yml"))):
         itself = of is not None and os.path.realpath(other) == os.path.realpath(of)
-        if not itself and other.is_file() and re.search(names_it, _head(other)):
+        if not itself and other.is_file() and os.access(other, os.R_OK) and re.search(names_it, _head(other)):
             said = shortened(other.name, 80)
             raise FileExistsError(f"it is the picture of the map {said}: remove that first, or choose another name")
 

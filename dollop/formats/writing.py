@@ -27,6 +27,8 @@ except ImportError:  # a system without, such as Windows
 __all__ = ["Output", "check_outputs", "check_writable", "checked_path", "together", "whole_file"]
 
 PART = re.compile(r"\.dollop-[0-9a-f]{16}\.part")
+PATIENCE = 10.0
+"""s that a writer waits for another one in the same folder, who holds it for a few milliseconds."""
 STALE = 86_400.0
 """s after which a neighbour counts as left behind where files cannot be locked: no file takes a day to write."""
 
@@ -253,21 +255,14 @@ def _begin(path, mode, kind, of):
         before = _replaced(target, kind)
         if kind in (PGM, PNG):
             check_is_nobodys(target, of)
-        folder, rights = (
-            os.path.dirname(target),
-            0o666 if before is None else stat.S_IMODE(before.st_mode),
-        )
+        folder = os.path.dirname(target)
         name = os.path.join(folder, f".dollop-{secrets.token_hex(8)}.part")
-        text = {} if "b" in mode else {"encoding": "utf-8"}
         with _alone_in([folder]):
             _sweep(folder)
-            stream = open(name, mode.replace("w", "x"), opener=partial(os.open, mode=rights), **text)  # noqa: SIM115
-            part = _Part(path, target, name, _locked(stream))
+            stream = _made(name, mode, before)
+            return _Part(path, target, name, _locked(stream)), stream
     except OSError as error:
         raise _naming(path, error) from None
-    if before is not None:
-        _keep_rights(name, before)
-    return part, stream
 
 
 def _replaced(target, kind):
@@ -289,13 +284,18 @@ def _replaced(target, kind):
     return status
 
 
-def _keep_rights(name, before):
-    """Give a neighbour the owner, where that is allowed, and the rights of the file that was before."""
-    if hasattr(os, "chown"):
+def _made(name, mode, before):
+    """A new file, with the rights, and the owner where that is allowed, of the file that was before."""
+    rights = 0o666 if before is None else stat.S_IMODE(before.st_mode)
+    encoding = None if "b" in mode else "utf-8"
+    stream = open(name, mode.replace("w", "x"), encoding=encoding, opener=partial(os.open, mode=rights))  # noqa: SIM115
+    if before is not None:
+        for owner in (-1, before.st_uid) if hasattr(os, "chown") else ():
+            with suppress(OSError):
+                os.chown(name, owner, before.st_gid)
         with suppress(OSError):
-            os.chown(name, before.st_uid, before.st_gid)
-    with suppress(OSError):
-        os.chmod(name, stat.S_IMODE(before.st_mode))
+            os.chmod(name, rights)  # those that the umask took
+    return stream
 
 
 def _end(part):
@@ -346,13 +346,36 @@ def _alone_in(folders):
     Where folders cannot be opened or locked, as on Windows, nothing is locked and flushed.
     """
     with ExitStack() as opened:
-        handles = []
+        handles = {}
         for folder in sorted(folders):
             with suppress(OSError):
-                handles.append(os.open(folder, os.O_RDONLY))
-                opened.callback(os.close, handles[-1])
-                _lock(handles[-1])
-        yield partial(_to_disk, handles)
+                handles[folder] = os.open(folder, os.O_RDONLY)
+                opened.callback(os.close, handles[folder])
+        for folder, handle in handles.items():
+            _wait_for(folder, handle)
+        yield partial(_to_disk, handles.values())
+
+
+def _wait_for(folder, handle):
+    """Lock a folder once nobody else holds it; refuse to wait for ever."""
+    patient = time.monotonic() + PATIENCE
+    while _is_held(handle):
+        if time.monotonic() > patient:
+            raise TimeoutError(f"another process has held the folder {folder} for {PATIENCE:g} s")
+        time.sleep(0.002)
+
+
+def _is_held(handle):
+    """Whether somebody else has locked a file or folder; if not, it is locked now. None where there are no locks."""
+    if fcntl is None:
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:  # a file system that has none
+        return None
+    return False
 
 
 def _to_disk(handles):
@@ -361,18 +384,12 @@ def _to_disk(handles):
             os.fsync(handle)
 
 
-def _lock(handle, wait=True):
-    if fcntl is not None:
-        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-
-
 def _locked(stream):
     """A second handle of a file, locked until it is closed; None where there are no locks."""
     if fcntl is None:
         return None
     handle = os.dup(stream.fileno())
-    with suppress(OSError):
-        _lock(handle)
+    _is_held(handle)
     return handle
 
 
@@ -388,17 +405,9 @@ def _sweep(folder):
 
 def _is_left(part):
     """Whether nobody writes a neighbour any more."""
-    old = time.time() - os.lstat(part).st_mtime > STALE
-    if fcntl is None:
-        return old
     with open(part, "rb") as stream:
-        try:
-            _lock(stream, wait=False)
-        except BlockingIOError:
-            return False
-        except OSError:  # a file system without locks
-            return old
-    return True
+        held = _is_held(stream.fileno())
+    return not held if held is not None else time.time() - os.lstat(part).st_mtime > STALE
 
 
 # ---- messages

@@ -10,13 +10,13 @@ from pathlib import Path
 import pandas as pd
 
 from dollop.formats.files import FormatError
-from dollop.formats.kinds import TRUTH
+from dollop.formats.kinds import CARMEN_LOG, SCENE, TRUTH
 from dollop.formats.logs import read_log, write_log
-from dollop.formats.writing import together, whole_file
+from dollop.formats.writing import Output, together, whole_file
 from dollop.lab.scenes import Scene
 from dollop.laser import LaserLog
 
-__all__ = ["MOVED_COLUMNS", "ROBOT_COLUMNS", "Recording", "TRUTH_COLUMNS"]
+__all__ = ["MOVED_COLUMNS", "ROBOT_COLUMNS", "Recording", "TRUTH_COLUMNS", "outputs"]
 
 TRUTH_COLUMNS = ["t", "x", "y", "heading"]
 """Of the first person; the others' end in their number: x_1, y_1, heading_1."""
@@ -91,6 +91,23 @@ class Recording:
         log = read_log(path)
         truth_path, scene_path = companions(path)
         return cls(log, load_truth(truth_path, len(log)), Scene.load(scene_path))
+
+
+def outputs(path):
+    """What `Recording.save` writes.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the log.
+
+    Returns
+    -------
+    list of Output
+        Log, truth and scene.
+    """
+    truth, scene = companions(path)
+    return [Output(path, CARMEN_LOG), Output(truth, TRUTH), Output(scene, SCENE)]
 
 
 def load_truth(path, n_scans):

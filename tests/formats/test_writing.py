@@ -393,6 +393,19 @@ def test_without_locks_only_what_is_old_is_swept_up(tmp_path, monkeypatch):
     assert left(tmp_path) == [young.name, "a"]
 
 
+@pytest.mark.skipif(writing.fcntl is None, reason="folders are locked")
+def test_nobody_waits_for_ever_for_a_folder(tmp_path, monkeypatch):
+    """Who finds it held for long says so, and leaves everything as it was."""
+    monkeypatch.setattr(writing, "PATIENCE", 0.05)
+    handle = os.open(tmp_path, os.O_RDONLY)
+    writing.fcntl.flock(handle, writing.fcntl.LOCK_EX)
+    with pytest.raises(TimeoutError, match="a cannot be written: another process has held the folder"):
+        put(tmp_path / "a")
+    os.close(handle)
+    assert left(tmp_path) == []
+    put(tmp_path / "a")
+
+
 def test_looking_whether_a_file_can_be_written_leaves_nothing(tmp_path):
     """Not even where something is there already."""
     check_writable(tmp_path / "a")
