@@ -59,11 +59,12 @@ def picture_of(path):
     Returns
     -------
     str or None
-        Its path; None where the map cannot be read, or names none.
+        Its path; None where the map cannot be read, or names none that is there.
     """
     with suppress(OSError, ValueError):
-        name = _read_keys(path).get("image")
-        return None if name is None else os.path.join(os.path.dirname(path), str(name))
+        folders = map(os.path.dirname, (path, os.path.realpath(path)))  # if the YAML is a link, beside either
+        places = [os.path.join(folder, str(_read_keys(path).get("image"))) for folder in folders]
+        return next(filter(os.path.exists, places), None)
 
 
 def write_map(path, occupancy, origin, resolution):
