@@ -62,14 +62,15 @@ def in_one_line(program, work, *arguments):
     Raises
     ------
     SystemExit
-        With 1 and the message for what is refused, 130 when interrupted. If nobody reads what it says
-        (a pipe that is closed) the work is done all the same, and the status 1.
+        With 1 and the message for what is refused, 130 when interrupted. If nobody reads what it
+        says (a pipe that is closed) the work is done all the same, and the status 1.
     """
     try:
         work(*arguments)
         sys.stdout.flush()
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python says so once more when it ends
+        # Or Python would say so once more when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except (ValueError, OSError, ImportError, OverflowError) as error:
         sys.exit(f"{program}: {error}")
@@ -226,7 +227,8 @@ def _outputs(options):
     if out.suffix != ".csv":
         raise ValueError(f"--out must be named .csv (its picture, .png, lands beside it), got {out}")
     picture = out.with_suffix(".png")
-    outputs = [Output(out, TRAJECTORY), Output(picture, PNG), *(Output(path, EVERYBODY) for path in tracks)]
+    outputs = [Output(out, TRAJECTORY), Output(picture, PNG)]
+    outputs += [Output(path, EVERYBODY) for path in tracks]
     check_outputs(outputs, [options.log, *map_inputs(options.map)])
     return out, picture
 

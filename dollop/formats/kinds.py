@@ -1,4 +1,4 @@
-"""What a file holds, told by its beginning: so that none is replaced by something of another kind."""
+"""What a file holds, told by its beginning: so that none is replaced by one of another kind."""
 
 import codecs
 import os
@@ -10,8 +10,8 @@ from typing import NamedTuple
 from dollop.checks import shortened
 
 __all__ = [
-    "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "PGM", "PNG", "ROS_MAP", "SCENE", "TASK", "TRAJECTORY", "TRUTH",
-    "Kind", "check_is_nobodys", "check_replaceable",
+    "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "PGM", "PNG", "ROS_MAP", "SCENE", "TASK", "TRAJECTORY",
+    "TRUTH", "Kind", "check_is_nobodys", "check_replaceable",
 ]  # fmt: skip
 
 HEAD = 4096
@@ -33,9 +33,11 @@ class Kind(NamedTuple):
     pattern: bytes
 
 
+_MESSAGE = rb"(?:[FR]LASER|ROBOTLASER\d|RAWLASER\d|ODOM|PARAM) "
 _MOVING = rb"(?:x|y|heading|object_x|object_y|laser_x|laser_y|laser_theta)(?:_\d+)?"
+_TRUTH = rb"\A(?=.*(?:heading|object_x|laser_x))t(?:," + _MOVING + rb")+\r?\n"
 
-CARMEN_LOG = Kind("a CARMEN log", rb"(?m)\A# CARMEN Logfile|^(?:[FR]LASER|ROBOTLASER\d|RAWLASER\d|ODOM|PARAM) ")
+CARMEN_LOG = Kind("a CARMEN log", rb"(?m)\A# CARMEN Logfile|^" + _MESSAGE)
 CARMEN_MAP = Kind("a CARMEN map", rb"\A(?:(?:#.*)?\n)*CARMENMAPFILE")
 ROS_MAP = Kind("a ROS map", rb"(?m)^[{\s]*[\"']?image[\"']?\s*:")
 PGM = Kind("a PGM picture", rb"\AP[25]\s")
@@ -44,7 +46,7 @@ TASK = Kind("a task", rb'\A\s*\{[^{}\[\]]*"format":\s*"dollop task"')
 SCENE = Kind("a scene", rb'\A\s*\{[^{}\[\]]*"format":\s*"dollop scene"')
 TRAJECTORY = Kind("a trajectory", rb"\At,x,y,occluded\r?\n")
 EVERYBODY = Kind("a table of everybody's trajectories", rb"\At,x,y,occluded,person\r?\n")
-TRUTH = Kind("the truth of a recording", rb"\A(?=.*(?:heading|object_x|laser_x))t(?:," + _MOVING + rb")+\r?\n")
+TRUTH = Kind("the truth of a recording", _TRUTH)
 _BAG = Kind("a ROS bag", rb"\A(?:#ROSBAG|\x89MCAP|SQLite format 3)")
 
 _KNOWN = CARMEN_LOG, CARMEN_MAP, PGM, PNG, TASK, SCENE, TRAJECTORY, EVERYBODY, TRUTH, _BAG, ROS_MAP
@@ -77,8 +79,9 @@ def check_replaceable(path, kind):
     """
     head = _head(path)
     if head and not re.search(kind.pattern, head):
-        found = next((each.name for each in _KNOWN if re.search(each.pattern, head)), "something else")
-        raise FileExistsError(f"it holds {found} and not {kind.name}: remove it first, or choose another name")
+        rule = "remove it first, or choose another name"
+        known = (each.name for each in _KNOWN if re.search(each.pattern, head))
+        raise FileExistsError(f"it holds {next(known, 'something else')} and not {kind.name}: {rule}")
 
 
 def check_is_nobodys(picture, of=None):
@@ -98,11 +101,11 @@ def check_is_nobodys(picture, of=None):
     picture = Path(picture)
     name = re.escape(os.fsencode(picture.name))
     names_it = rb"(?m)\bimage\b[^\n]*[\s/\"':]" + name + rb"(?:[\s\"',}#]|\Z)"
+    own = None if of is None else os.path.realpath(of)
     for other in sorted((*picture.parent.glob("*.yaml"), *picture.parent.glob("*.yml"))):
-        itself = of is not None and os.path.realpath(other) == os.path.realpath(of)
-        if not itself and other.is_file() and os.access(other, os.R_OK) and re.search(names_it, _head(other)):
-            said = shortened(other.name, 80)
-            raise FileExistsError(f"it is the picture of the map {said}: remove that first, or choose another name")
+        readable = other.is_file() and os.access(other, os.R_OK)
+        if readable and os.path.realpath(other) != own and re.search(names_it, _head(other)):
+            raise FileExistsError(f"it is the picture of the map {shortened(other.name, 80)}: choose another name")
 
 
 def _head(path):

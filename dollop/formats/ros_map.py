@@ -62,7 +62,8 @@ def picture_of(path):
         Its path; None where the map cannot be read, or names none that is there.
     """
     with suppress(OSError, ValueError):
-        folders = map(os.path.dirname, (path, os.path.realpath(path)))  # if the YAML is a link, beside either
+        # If the YAML is a link, beside either.
+        folders = map(os.path.dirname, (path, os.path.realpath(path)))
         places = [os.path.join(folder, str(_read_keys(path).get("image"))) for folder in folders]
         return next(filter(os.path.exists, places), None)
 

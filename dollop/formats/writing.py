@@ -30,7 +30,7 @@ PART = re.compile(r"\.dollop-[0-9a-f]{16}\.part")
 PATIENCE = 10.0
 """s that a writer waits for another one in the same folder, who holds it for a few milliseconds."""
 STALE = 86_400.0
-"""s after which a neighbour counts as left behind where files cannot be locked: no file takes a day to write."""
+"""s after which a neighbour counts as left behind where files cannot be locked: none takes a day."""
 
 
 class Output(NamedTuple):
@@ -72,7 +72,7 @@ def checked_path(path):
 
 
 def check_outputs(outputs, inputs=()):
-    """Refuse before the work what could not be written after it, or would destroy what it came from.
+    """Refuse before the work what could not be written after it, or would destroy what is read.
 
     Parameters
     ----------
@@ -133,9 +133,10 @@ def check_writable(path, kind=None, of=None):
 def together():
     """Files that belong together: all that are written within take their names at its end, or none.
 
-    The last one is the main file. The others are removed before it is replaced, and take their names
-    after it: a run that is killed in between leaves the old main file or the new one, and beside it
-    files of the same run or none, never of another run. One `together` within another is part of it.
+    The last one is the main file. The others are removed before it is replaced, and take their
+    names after it: a run that is killed in between leaves the old main file or the new one, and
+    beside it files of the same run or none, never of another run. One `together` within another is
+    part of it.
 
     Yields
     ------
@@ -181,9 +182,9 @@ _GROUP = ContextVar("the neighbours that take their names together", default=Non
 def whole_file(path, mode="wb", kind=None, of=None):
     """A temporary neighbour of a file, open for writing; it takes its name only if all goes well.
 
-    It is flushed to the disk before, and the folder after. A file that is replaced keeps its rights,
-    and its owner where that is allowed; through a symbolic link the file that it points to is
-    replaced. Text is UTF-8.
+    It is flushed to the disk before, and the folder after. A file that is replaced keeps its
+    rights, and its owner where that is allowed; through a symbolic link the file that it points to
+    is replaced. Text is UTF-8.
 
     Parameters
     ----------
@@ -206,7 +207,8 @@ def whole_file(path, mode="wb", kind=None, of=None):
     OSError
         If it cannot be written: there is no such folder or no room, or what bears the name is no
         ordinary file, may not be written, has other names (hard links, of which one would be cut
-        off), is something of another kind, or the picture of another map. The error names the file, not its neighbour.
+        off), is something of another kind, or the picture of another map. The error names the file,
+        not its neighbour.
 
     Examples
     --------
@@ -240,7 +242,7 @@ def whole_file(path, mode="wb", kind=None, of=None):
 
 
 class _Part(NamedTuple):
-    """A file that has not taken its name yet: what was asked for, the file that is, its neighbour, and a lock."""
+    """A neighbour: the path that was asked for, the file that it will be, its name now, and a lock."""
 
     path: object
     target: str
@@ -266,7 +268,7 @@ def _begin(path, mode, kind, of):
 
 
 def _replaced(target, kind):
-    """The status of the file that is to be replaced, None if there is none; refuse what must not be."""
+    """The status of the file that is to be replaced, None if there is none."""
     try:
         status = os.lstat(target)
     except FileNotFoundError:
@@ -276,7 +278,8 @@ def _replaced(target, kind):
     if not stat.S_ISREG(status.st_mode):
         raise FileExistsError("it is no ordinary file")
     if status.st_nlink > 1:
-        raise FileExistsError(f"it has {status.st_nlink} names (hard links), of which this one would be cut off")
+        rule = "of which this one would be cut off"
+        raise FileExistsError(f"it has {status.st_nlink} names (hard links), {rule}")
     if not status.st_mode & 0o222 or not os.access(target, os.W_OK):
         raise PermissionError("it may not be written")
     if kind is not None and status.st_size:
@@ -285,10 +288,10 @@ def _replaced(target, kind):
 
 
 def _made(name, mode, before):
-    """A new file, with the rights, and the owner where that is allowed, of the file that was before."""
+    """A new file, with the rights, and if that is allowed the owner, of the one that was before."""
     rights = 0o666 if before is None else stat.S_IMODE(before.st_mode)
-    encoding = None if "b" in mode else "utf-8"
-    stream = open(name, mode.replace("w", "x"), encoding=encoding, opener=partial(os.open, mode=rights))  # noqa: SIM115
+    text, opener = {} if "b" in mode else {"encoding": "utf-8"}, partial(os.open, mode=rights)
+    stream = open(name, mode.replace("w", "x"), opener=opener, **text)  # noqa: SIM115
     if before is not None:
         for owner in (-1, before.st_uid) if hasattr(os, "chown") else ():
             with suppress(OSError):
@@ -341,7 +344,7 @@ def _do(part, change, *names):
 
 @contextmanager
 def _alone_in(folders):
-    """No other writer makes, removes or renames neighbours in these folders; yields what flushes them to disk.
+    """No other writer makes or renames neighbours in these folders; yields what flushes them to disk.
 
     Where folders cannot be opened or locked, as on Windows, nothing is locked and flushed.
     """
@@ -366,7 +369,7 @@ def _wait_for(folder, handle):
 
 
 def _is_held(handle):
-    """Whether somebody else has locked a file or folder; if not, it is locked now. None where there are no locks."""
+    """Whether somebody else has locked a file; if not, it is locked now. None if there are no locks."""
     if fcntl is None:
         return None
     try:
