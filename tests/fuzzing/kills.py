@@ -38,6 +38,8 @@ RENAMES = "replace", "rename", "unlink", "link"
 STEPS = (*RENAMES, "open", "fsync")
 """Functions of `os` at which a run is killed: before the call, or after it."""
 KILLED = 9
+MEMORY = "/dev/shm" if os.path.isdir("/dev/shm") else None
+"""Where files are in memory, there they are tried: processes are killed here, and not the machine."""
 
 
 @dataclass(frozen=True)
@@ -172,13 +174,14 @@ def figure(folder, version):
 
 
 def data(folder, version):
-    """The recordings of the notebooks, small ones in their place."""
+    """The recordings of the notebooks, fewer and small ones in their place."""
     from dollop.lab import Recording
     from dollop.replication import recordings
 
     scene = Recording.load(DATA / "slalom_0.log.gz").scene
     truth = Recording.load(DATA / "moved_cans_0.log.gz").truth
     small = Recording(two_scans(version), truth, scene)
+    recordings.LAYOUTS = ()
     recordings.empty_lab = lambda: two_scans(version)
     recordings.background_map = lambda: small_map(version)
     recordings.figure_eights = recordings.slalom = lambda *_: SimpleNamespace(recording=small)
@@ -200,9 +203,8 @@ def replication():
     if not find_spec(EXTRAS["lab"]):
         return
     import dollop.replication.figures  # noqa: F401, before the first fork
-    from dollop.replication.recordings import LAYOUTS
 
-    names = ["figure_eights", "moved_cones", "slalom_0", "slalom_1", *(f"moved_cans_{k}" for k in range(len(LAYOUTS)))]
+    names = "figure_eights", "moved_cones", "slalom_0", "slalom_1"
     shown = [(f"{name}.log.gz", f"{name}_truth.csv", f"{name}_scene.json") for name in names]
     yield Writer("figures", figure, (("metrics.json", "README.md", "fig_08.png"),), (), True)
     yield Writer("data", data, (("empty_lab.log.gz", "lab.yaml", "lab.pgm"), *shown), (), True)
@@ -376,7 +378,7 @@ def at_every_step(writer, fresh=False, steps=STEPS, moments=(False, True)):
     wrong : list of str
     """
     found, count = [], 0
-    with tempfile.TemporaryDirectory() as place:
+    with tempfile.TemporaryDirectory(dir=MEMORY) as place:
         trial = Trial(writer, Path(place), fresh)
         for k in itertools.count():
             step, late = k // len(moments), moments[k % len(moments)]
@@ -398,7 +400,7 @@ def at_random_moments(writers, kills, seed):
     wrong : list of str
     """
     rng, done, found = random.Random(seed), Counter(), []
-    with tempfile.TemporaryDirectory() as place:
+    with tempfile.TemporaryDirectory(dir=MEMORY) as place:
         trials = []
         for k, writer in enumerate(writers):
             (Path(place) / str(k)).mkdir()
@@ -421,7 +423,7 @@ def command():
     options = parser.parse_args()
     writers, wrong = [*library(), *replication()], []
     for writer, fresh in itertools.product(writers, (False, True)):
-        count, found = at_every_step(writer, fresh)
+        count, found = at_every_step(writer, fresh, moments=(False,) if fresh else (False, True))
         print(f"{writer.name}{', nothing there before' if fresh else ''}: {count} kills at its steps", flush=True)
         wrong += found
     done, found = at_random_moments(writers, options.kills, options.seed)
