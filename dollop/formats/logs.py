@@ -4,6 +4,7 @@ from pathlib import Path
 
 from dollop.formats import carmen_log, ros_bag
 from dollop.formats.files import FormatError
+from dollop.formats.writing import checked_path
 
 __all__ = ["read_log", "read_odometry", "write_log"]
 
@@ -109,7 +110,7 @@ def write_log(path, log):
     ValueError
         If the beams are not evenly spaced.
     """
-    _check_is_carmen(Path(path))
+    _check_is_carmen(checked_path(path))
     carmen_log.write_log(path, log)
 
 
