@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from dollop.checks import check_choice, check_positive, checked_array
-from dollop.law.line import lines_of
+from dollop.law.line import check_ends, lines_of
 from dollop.law.timing import CORNER, Stands, shown_pauses, shown_profile, times_along, turns_at
-from dollop.lds import LDS, Statistics
+from dollop.lds import LDS, MOST_STEPS, Statistics
 from dollop.segmentation import (
     best_segments,
     cuts_within,
@@ -27,13 +27,15 @@ from dollop.trajectory import (
     resample,
 )
 
-__all__ = ["SequencedLDS"]
+__all__ = ["SequencedLDS", "check_times"]
 
 LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none would ever arrive
 REACH = 0.01  # m, to which lines are rolled out
 TURNED = np.radians(10)  # over two decimetres: on a radius of 1.1 m, which is no corner
 ROUNDS = 8  # how often a walk is divided anew: nearly always two are enough
 MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
+MOST_TIMES = 1_000_000
+"""Times of a response: more than a day, ten times a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +225,8 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            A start that is no position, too small a reach, another method or segment.
+            A start that is no position, too small a reach, another method or segment, or a response
+            that is not within reach of a subgoal after 100,000 steps.
 
         Examples
         --------
@@ -297,7 +300,10 @@ class SequencedLDS:
         for each in self.segments[segment:]:
             states = [place]
             while np.linalg.norm(states[-1] - each.goal) > reach:
+                check_ends(len(states), each.goal, reach)
                 states.append(each.step(states[-1]))
+                if (states[-1] == states[-2]).all():  # no nearer in floating point
+                    check_ends(MOST_STEPS, each.goal, reach)
             parts.append(np.array(states))
             place = states[-1]
         return parts
@@ -322,7 +328,7 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            A period that is not positive.
+            A period that is not positive, or so short that there would be more than a million times.
 
         Examples
         --------
@@ -338,6 +344,7 @@ class SequencedLDS:
         speeds = np.asarray(self.speeds, float)[:, None] if self.profile is None else self.profile
         pauses = np.zeros(len(self.segments) + 1) if self.pauses is None else self.pauses
         when, places = times_along([line.places for line in self.lines()], speeds, pauses)
+        check_times(when[-1], period)
         t = period * np.arange(int(np.ceil(when[-1] / period - 1e-9)) + 1)
         return t, np.stack([np.interp(t, when, column) for column in places.T], axis=1)
 
@@ -437,6 +444,32 @@ class SequencedLDS:
             segments = map(LDS.turned, segments, turns)
         moved = [replace(segment, goal=goal) for segment, goal in zip(segments, goals, strict=True)]
         return replace(self, segments=tuple(moved), start=start)
+
+
+def check_times(lasting, period):
+    """Refuse what lasts longer than a million periods.
+
+    Parameters
+    ----------
+    lasting : float
+        s.
+    period : float
+        s.
+
+    Raises
+    ------
+    ValueError
+        The message names both: either the period is wrong, or a pause is one of the clock's.
+
+    Examples
+    --------
+    >>> check_times(1.7e9, 0.1)
+    Traceback (most recent call last):
+    ValueError: what is driven must last at most 1000000 periods, got 1.7e+09 s at a period of 0.1 s
+    """
+    if not lasting <= (MOST_TIMES - 1) * period:
+        rule = f"what is driven must last at most {MOST_TIMES} periods"
+        raise ValueError(f"{rule}, got {lasting:.6g} s at a period of {period:g} s")
 
 
 def chord_angles(start, subgoals):

@@ -13,7 +13,7 @@ from walks import any_walk, moving, walk_figure_eights
 
 from dollop.laps import laps
 from dollop.law.timing import turns_at
-from dollop.lds import LDS
+from dollop.lds import LDS, Statistics
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory, resample
 
@@ -202,7 +202,8 @@ def test_walks_of_another_way_are_never_averaged(five_laps, others):
     """A walk backwards is named, with how far it is away and what to do, whether or not it is outnumbered."""
     walks = [*five_laps[:others], five_laps[3], five_laps[4][::-1]]
     with pytest.raises(
-        ValueError, match=rf"got trajectory {others + 1} .* m away from .*dollop.learn keeps ways apart"
+        ValueError,
+        match=rf"got trajectory {others + 1} .* m away from .*dollop.learn keeps ways apart",
     ):
         SequencedLDS.fit(walks)
 
@@ -270,3 +271,29 @@ def test_any_walk_can_be_fitted(walk, count, retimed):
     assert np.linalg.norm(law.response()[-1] - law.subgoals[-1]) <= 0.01
     fastest = max(np.diff(arc_length(walk)).max() for walk in walks) / 0.1
     assert (law.speeds >= 0).all() and (law.speeds <= fastest * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("method", ["held", "paper"])
+def test_a_response_that_takes_too_long_is_refused(method):
+    """An LDS that keeps all but a billionth of its offset would need ten thousand million steps."""
+    slow = LDS(Statistics(np.eye(2), (1 - 1e-9) * np.eye(2)), np.zeros(2))
+    law = SequencedLDS((slow,), np.array([3.0, 1.0]), np.ones(1))
+    with pytest.raises(ValueError, match="must come within 0.01 m of its subgoal in 100000 steps"):
+        law.response(method=method)
+
+
+def test_a_subgoal_beyond_all_precision_ends_or_is_refused(law):
+    """At 1e17 m neighbouring numbers are 16 m apart: none need lie within reach, and nothing goes on for ever."""
+    far = law.with_subgoals(law.subgoals + [1e17, 0.0])
+    assert np.isfinite(far.response()).all()
+    with pytest.raises(ValueError, match="in 100000 steps"):
+        far.response(method="paper")
+
+
+@pytest.mark.parametrize("goal", [1e6, -1e9])
+def test_as_far_as_places_may_be_every_response_arrives(law, goal):
+    """A thousand million metres off, to a tenth of a millimetre; a micrometre is eight steps of such numbers."""
+    far = law.with_subgoals(law.subgoals + goal)
+    for method in ("held", "paper"):
+        end = far.response(reach=1e-4, method=method)[-1]
+        assert np.linalg.norm(end - far.subgoals[-1]) <= 1e-4
