@@ -248,16 +248,17 @@ def checked_array(name, values, *shape, finite=True, least=-np.inf, most=np.inf)
     """
     array = _as_floats(name, values)
     _check_shape(name, array.shape, shape)
-    wrong = None
-    if finite and not np.isfinite(array).all():
-        wrong, rule = ~np.isfinite(array), "finite"
-    elif least > -np.inf or most < np.inf:
-        outside = (array < least) | (array > most)
-        wrong, rule = (outside, f"in {least:g} to {most:g}") if outside.any() else (None, "")
-    if wrong is not None:
-        row = np.argwhere(np.atleast_1d(wrong))[0, 0]
-        raise ValueError(f"{name} must be {rule}, got {told(np.atleast_1d(array)[row].tolist())} in row {row}")
-    return array
+    bounded = least > -np.inf or most < np.inf
+    if not (finite or bounded):
+        return array
+    good = (array >= least) & (array <= most) if bounded else np.isfinite(array)
+    good = good if finite else good | np.isnan(array)
+    if good.all():
+        return array
+    row = np.argwhere(~np.atleast_1d(good))[0, 0]
+    found = np.atleast_1d(array)[row]
+    rule = "finite" if finite and not np.isfinite(found).all() else f"in {least:g} to {most:g}"
+    raise ValueError(f"{name} must be {rule}, got {told(found.tolist())} in row {row}")
 
 
 def _as_floats(name, values):
