@@ -379,7 +379,6 @@ def test_a_demonstration_that_cannot_be_matched_is_set_aside(method):
         ([None], "one for each of 2 demonstrations, got 1"),
         ([None, "mine"], "must be a Matching, .* got 'mine'"),
         ([None, Matching.identity(3)], "must go from the 8 corners of demonstration 1 .* got 12 indices"),
-        ([None, Matching(np.array([0, 1, 2, 3] * 2), 0.0, 1.0, True)], "must not send two corners to one"),
     ],
 )
 def test_matchings_that_do_not_belong_are_refused(matchings, message):
