@@ -37,7 +37,7 @@ from dollop.trajectory import (
     resample,
 )
 
-__all__ = ["SequencedLDS", "check_times"]
+__all__ = ["LEAST_REACH", "PERIODS", "SequencedLDS", "check_times"]
 
 LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none would ever arrive
 REACH = 0.01  # m, to which lines are rolled out
