@@ -91,7 +91,12 @@ class Association:
         if heaviest > most:
             raise ValueError(f"the weights of a subgoal must sum to 1 at most, got {heaviest:g}")
         differences = checked_array(
-            "differences", self.differences, *corners.shape, 2, least=-2 * FARTHEST, most=2 * FARTHEST
+            "differences",
+            self.differences,
+            *corners.shape,
+            2,
+            least=-2 * FARTHEST,
+            most=2 * FARTHEST,
         )
         put_in(self, corners=corners, weights=weights, differences=differences)
 

@@ -26,7 +26,7 @@ from dollop.checks import (
     checked_record,
     put_in,
 )
-from dollop.gridmap import flat_cells
+from dollop.gridmap import SIDES, flat_cells
 from dollop.pose import wrapped
 
 __all__ = [
@@ -44,7 +44,10 @@ _CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
 # The ceiling would make 1 of a rounding error of 1e-13: changes of force below this many units
 # count as none.
 _ROUNDING = 1e-6
-_ONE_PLACE, _MOST_COSTS = 1e-12, 2.0**53  # m²: corners that coincide; and what a whole number can be
+_ONE_PLACE, _MOST_COSTS = (
+    1e-12,
+    2.0**53,
+)  # m²: corners that coincide; and what a whole number can be
 
 
 LINK, SPACINGS = 0.15, 2.2
@@ -58,8 +61,6 @@ APART, ONE_OBJECT = 0.40, 1.5
 """m: two surfaces nearer than that are one where no beam passes between, and make no larger box."""
 CUT_OFF = 0.08
 """m from an end that something hides within which a side of the box may lie farther out."""
-SIDES = 1e-6, 1e3
-"""m: cells of a map are neither smaller nor larger."""
 MOST_ADDED, UNSURE = 0.10, 0.15
 """m that a face may go on beyond its last reading; and m between readings from which on its end is
 not known."""

@@ -140,7 +140,11 @@ class Matching:
             raise ValueError(f"a matching must not send two corners to one, got {told(indices.tolist())}")
         put_in(self, indices=indices, confident=checked_flag("confident", self.confident))
         most = np.finfo(float).max
-        put_in(self, cost=checked_number("cost", self.cost, -most, most), turn=checked_number("turn", self.turn))
+        put_in(
+            self,
+            cost=checked_number("cost", self.cost, -most, most),
+            turn=checked_number("turn", self.turn),
+        )
         put_in(self, margin=checked_number("margin", self.margin, -most, np.inf))
         self._check_probabilities()
 

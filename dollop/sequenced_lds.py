@@ -17,7 +17,15 @@ from dollop.checks import (
     put_in,
 )
 from dollop.law.line import check_ends, lines_of
-from dollop.law.timing import CORNER, SOONEST, Stands, shown_pauses, shown_profile, times_along, turns_at
+from dollop.law.timing import (
+    CORNER,
+    SOONEST,
+    Stands,
+    shown_pauses,
+    shown_profile,
+    times_along,
+    turns_at,
+)
 from dollop.lds import LDS, MOST_STEPS, Statistics
 from dollop.segmentation import (
     best_segments,
@@ -100,9 +108,15 @@ class SequencedLDS:
             speeds=checked_array("speeds", self.speeds, len(segments), least=least, most=most),
         )
         if self.profile is not None:
-            put_in(self, profile=checked_array("profile", self.profile, len(segments), "M", least=0, most=most))
+            put_in(
+                self,
+                profile=checked_array("profile", self.profile, len(segments), "M", least=0, most=most),
+            )
         if self.pauses is not None:
-            put_in(self, pauses=checked_array("pauses", self.pauses, len(segments) + 1, least=0, most=LONGEST_PAUSE))
+            put_in(
+                self,
+                pauses=checked_array("pauses", self.pauses, len(segments) + 1, least=0, most=LONGEST_PAUSE),
+            )
         if self.corners is not None:
             put_in(self, corners=checked_flags("corners", self.corners, len(segments)))
 

@@ -429,7 +429,14 @@ def _laid_out(known, environment, objects, turn=0.0):
     tied = tied_to_corners(ways[0], placed[0], laws[0], environment, objects)
     notes = dict.fromkeys((*known["notes"], *told_of_places(ways, kept, partners)))
     shown = tuple(len(way.members) for way in ways)
-    return Task(laws[0], environment, tied, ways=laws, shown=shown, **known | {"objects": objects, "notes": notes})
+    return Task(
+        laws[0],
+        environment,
+        tied,
+        ways=laws,
+        shown=shown,
+        **known | {"objects": objects, "notes": notes},
+    )
 
 
 def _partners(partners):
@@ -503,5 +510,10 @@ def learn(demonstrations, environment=None, matchings=None, method="anchored", s
         law, tied, model = learn_as_paper(shown, [found[k] for k in used], environment, spread)
         return Task(law, environment, tied, model, demonstrations, notes, partners=partners)
     ways, model, told = learn_anchored(demonstrations, partners, environment, spread=spread)
-    known = {"model": model, "demonstrations": demonstrations, "notes": (*notes, *told), "partners": partners}
+    known = {
+        "model": model,
+        "demonstrations": demonstrations,
+        "notes": (*notes, *told),
+        "partners": partners,
+    }
     return _laid_out(known | {"learned": ways}, environment, np.arange(len(environment)))
