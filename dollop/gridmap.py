@@ -29,6 +29,7 @@ __all__ = [
     "OccupancyGrid",
     "check_is_map",
     "covered_cells",
+    "distances_to",
     "flat_cells",
     "in_cells",
     "in_metres",
@@ -302,7 +303,7 @@ class OccupancyGrid:
 
     @cached_property
     def _distances(self):
-        distances = scipy.ndimage.distance_transform_edt(~self.occupied, sampling=self.resolution)
+        distances = distances_to(self.occupied, self.resolution)
         if not self.occupied.any():
             distances[:] = np.inf
         distances.flags.writeable = False
@@ -577,3 +578,33 @@ def covered_cells(boxes, origin, resolution, shape):
     for left, bottom, right, top in zip(*low, *high, strict=True):
         covered[bottom:top, left:right] = True
     return covered
+
+
+def distances_to(cells, side=1.0):
+    """Distance of every cell of a grid to the nearest of some, centre to centre.
+
+    Row by row, so that next to the result it takes 9 bytes a cell for a moment (SciPy's own 48).
+
+    Parameters
+    ----------
+    cells : (H, W) bool array
+        Where some are; if there are none, the distances are no numbers to be used.
+    side : float
+        Of a cell in m.
+
+    Returns
+    -------
+    (H, W) float array
+        In m, 0 at the cells themselves.
+
+    Examples
+    --------
+    >>> distances_to(np.array([[True, False, False], [False, False, False]]), 0.5).round(3).tolist()
+    [[0.0, 0.5, 1.0], [0.5, 0.707, 1.118]]
+    """
+    nearest = scipy.ndimage.distance_transform_edt(~cells, side, return_distances=False, return_indices=True)
+    distances, columns = np.empty(cells.shape), np.arange(cells.shape[1])
+    for row, (near_row, near_column) in enumerate(zip(*nearest, strict=True)):
+        down, right = (near_row - row) * side, (near_column - columns) * side
+        np.sqrt(down * down + right * right, out=distances[row])
+    return distances

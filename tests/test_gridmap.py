@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from dollop.formats.files import FormatError
 from dollop.formats.logs import read_log
-from dollop.gridmap import OccupancyGrid
+from dollop.gridmap import OccupancyGrid, distances_to
 from dollop.laser import LaserLog
 
 ROOM = np.array([[-2.02, 3.01], [-1.51, 2.53]])  # xmin, xmax; ymin, ymax
@@ -283,3 +283,13 @@ def test_counts_are_those_of_one_beam_at_a_time(heading):
     seen = grid.cell_centres(np.argwhere(~grid.unknown))
     size = np.multiply(grid.occupancy.shape, resolution).max()
     assert np.ptp(seen, axis=0).max() + 6 * resolution > size
+
+
+@pytest.mark.parametrize("shape", [(1, 9), (9, 1), (13, 17)])
+def test_distances_are_those_of_all_pairs(shape):
+    """To the nearest of all cells, by trying each."""
+    cells = np.random.default_rng(1).random(shape) < 0.1
+    cells[0, 0] = True
+    every = np.argwhere(np.ones(shape))
+    apart = np.linalg.norm(every[:, None] - np.argwhere(cells), axis=2).min(axis=1)
+    assert distances_to(cells, 0.1) == pytest.approx(0.1 * apart.reshape(shape))

@@ -84,7 +84,7 @@ class Stands:
 
 def _still(walk, period):
     """Spans (first, last) of samples that all belong to some window in which the walk stands."""
-    width = int(np.ceil(LEAST / period - 1e-9)) + 1
+    width = int(min(np.ceil(LEAST / period - 1e-9), len(walk))) + 1
     speed = arc_length(walk)[-1] / (len(walk) * period)
     radius = min(STILL, SLOW * speed * LEAST)
     if width > len(walk):
