@@ -566,7 +566,8 @@ def user_notes(user, person, people, tracks, choice, background, now):
         )
     for when in beside(user, others=[who for who in tracks if who is not user]):
         yield Note(
-            "exchange", f"{when - user.t[0]:.1f} s after the user was first seen a track beside them begins or ends"
+            "exchange",
+            f"{when - user.t[0]:.1f} s after the user was first seen a track beside them begins or ends",
         )
         break
     left = now - user.t[-1]
