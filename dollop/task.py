@@ -30,7 +30,7 @@ from dollop.learning.saving import as_dict, read_task
 from dollop.learning.way import Way
 from dollop.matching import Matching
 from dollop.sequenced_lds import LEAST_REACH, PERIODS, SequencedLDS
-from dollop.trajectory import check_trajectories, ways_apart
+from dollop.trajectory import check_trajectories, is_one, ways_apart
 
 __all__ = ["Demonstration", "Task", "learn"]
 
@@ -67,10 +67,9 @@ class Demonstration:
     notes: tuple = ()
 
     def __post_init__(self):
-        walks = check_trajectories(self.trajectory)
+        one, walks = is_one(self.trajectory), check_trajectories(self.trajectory)
         for walk in walks:
             walk.flags.writeable = False
-        one = np.ndim(self.trajectory[0]) == 1
         put_in(
             self,
             trajectory=walks[0] if one else walks,
