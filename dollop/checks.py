@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 FARTHEST = 1e9
-"""m from the origin, or rad: coordinates beyond are no metres, and lose the millimetre that tells two apart."""
+"""m from the origin, or rad: coordinates beyond are no metres, and lose the millimetre that tells."""
 LATEST = 1e11
 """s: three thousand years. What counts milliseconds since 1970 lies beyond, and is refused."""
 
@@ -148,13 +148,14 @@ def _check_shape(name, found, wanted):
     """Refuse another shape than the one wanted."""
     axes = found[max(len(found) - len(wanted) + 1, 0) :] if wanted[:1] == ("...",) else found
     sizes = wanted[1:] if wanted[:1] == ("...",) else wanted
-    if len(axes) != len(sizes) or any(n != m for n, m in zip(sizes, axes, strict=True) if not isinstance(n, str)):
+    named = [isinstance(n, str) or n == m for n, m in zip(sizes, axes, strict=False)]
+    if len(axes) != len(sizes) or not all(named):
         told_of = f"({wanted[0]},)" if len(wanted) == 1 else f"({', '.join(map(str, wanted))})"
         raise ValueError(f"{name} must have shape {told_of}, got {told(found)}")
 
 
 def check_positive(name, value, or_zero=False):
-    """Refuse a number that is negative, infinite or NaN, or zero unless that is allowed; and what is no number.
+    """Refuse what is no number, or is negative, infinite or NaN, or zero unless that is allowed.
 
     Parameters
     ----------
@@ -209,10 +210,10 @@ def check_choice(name, value, known):
 
 
 def checked_array(name, values, *shape, finite=True, least=-np.inf, most=np.inf):
-    """Values as a float array of their own, if they are numbers, their shape the one wanted and all finite.
+    """Values as a float array of their own, if they are numbers, finite and of the shape wanted.
 
-    Numbers are whole or real ones, of Python, numpy or pandas. Text, truth values, dates, None, complex
-    and masked arrays and arrays of objects are none, not even where one would go through for a number.
+    Numbers are whole or real ones, of Python, numpy or pandas. Text, truth values, dates, None,
+    complex and masked arrays and arrays of objects are none, nor is a list that holds one of them.
 
     Parameters
     ----------
@@ -347,7 +348,7 @@ def checked_flags(name, values, *shape):
 
 
 def checked_number(name, value, least=-FARTHEST, most=FARTHEST):
-    """A value as a float, if it is a finite number within bounds, and neither text nor True nor False.
+    """A value as a float, if it is a finite number within bounds, and no text, True or False.
 
     Parameters
     ----------
@@ -382,7 +383,7 @@ def checked_number(name, value, least=-FARTHEST, most=FARTHEST):
 
 
 def checked_whole(name, value, least=0, most=FARTHEST):
-    """A value as an int, if it is a whole number within bounds: 3 and 3.0 are, 1.9 and True are not.
+    """A value as an int, if it is a whole number within bounds: 3 or 3.0, not 1.9 or True.
 
     Parameters
     ----------

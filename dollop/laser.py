@@ -15,7 +15,7 @@ from dollop.checks import (
 )
 from dollop.pose import wrapped
 
-__all__ = ["LaserLog"]
+__all__ = ["FULL_TURN", "LaserLog"]
 
 FULL_TURN = 2 * np.pi + 1e-6  # rad, and what rounding adds
 LEAST_RANGE = 1e-6  # m

@@ -269,8 +269,8 @@ def perform(
     ValueError
         For an unknown control law, a start, subgoal or kidnapping that is not finite, off the map
         or in an obstacle (a subgoal: if every way has such a one), a time-out that is not positive,
-        a kidnapping before the start, no ways, or not as many as `shown` counts; for a task or robot
-        that lacks something, and what is not of its kind.
+        a kidnapping before the start, no ways, or not as many as `shown` counts; for a task or
+        robot that lacks something, and what is not of its kind.
 
     Examples
     --------
@@ -332,7 +332,7 @@ def ways_of(task, only=False):
 
 
 def check_robot(robot, kidnap):
-    """Refuse what cannot perform a task, or be kidnapped if that is wanted; see the top of this module.
+    """Refuse what cannot perform a task, or be kidnapped if that is wanted; see the module's top.
 
     Raises
     ------
