@@ -63,7 +63,7 @@ class _Told(Repr):
 
 _REPR = _Told()
 _REPR.maxlevel, _REPR.maxstring, _REPR.maxother = 3, 45, 60
-_LARGEST = float(np.finfo(float).max)
+_LARGEST, _MOST_SEED = float(np.finfo(float).max), 2**128
 
 
 def told(value, most=60):
@@ -128,6 +128,12 @@ def _is_number(value):
     return type(value) in _PLAIN or (isinstance(value, _REAL) and not isinstance(value, _NO_NUMBER))
 
 
+def _own(value):
+    """A number as one of Python's: half precision is not compared with what it does not hold."""
+    with np.errstate(over="ignore"):
+        return int(value) if isinstance(value, int | np.integer) else float(value)
+
+
 def _holds_numbers(values, depth=0):
     """Whether a value is a number, or an array or rows of nothing else."""
     if isinstance(values, np.ndarray) and not isinstance(values, np.ma.MaskedArray):
@@ -177,7 +183,7 @@ def check_positive(name, value, or_zero=False):
     Traceback (most recent call last):
     ValueError: tolerance must be positive and finite, got nan
     """
-    if not (_is_number(value) and (0 < value <= _LARGEST or (or_zero and value == 0))):
+    if not (_is_number(value) and (0 < _own(value) <= _LARGEST or (or_zero and value == 0))):
         rule = "finite and not negative" if or_zero else "positive and finite"
         raise ValueError(f"{name} must be {rule}, got {told(value)}")
 
@@ -373,9 +379,11 @@ def checked_number(name, value, least=-FARTHEST, most=FARTHEST):
     Traceback (most recent call last):
     ValueError: turn must be a finite number, got '0.4'
     """
-    if not _is_number(value):
-        raise ValueError(f"{name} must be a finite number, got {told(value)}")
-    if not least <= value <= most:
+    if type(value) is not float:
+        if not _is_number(value):
+            raise ValueError(f"{name} must be a finite number, got {told(value)}")
+        value = _own(value)
+    if not (least <= value <= most and (type(value) is float or abs(value) <= _LARGEST)):
         lost = max(-least, most) <= FARTHEST and not -FARTHEST <= value <= FARTHEST
         rule = f"a finite number within {FARTHEST:g}" if lost else f"in {least:g} to {most:g}"
         raise ValueError(f"{name} must be {rule}, got {told(value)}")
@@ -408,7 +416,7 @@ def checked_whole(name, value, least=0, most=FARTHEST):
     Traceback (most recent call last):
     ValueError: m must be a whole number, 1 to 8, got 1.9
     """
-    if not (_is_number(value) and least <= value <= most and value == int(value)):
+    if not (_is_number(value) and least <= _own(value) <= most and value == int(value)):
         raise ValueError(f"{name} must be a whole number, {least:.12g} to {most:.12g}, got {told(value)}")
     return int(value)
 
@@ -558,12 +566,11 @@ def checked_generator(name, seed):
     --------
     >>> checked_generator("seed", "luck")
     Traceback (most recent call last):
-    ValueError: seed must be a whole number from 0 on, or a Generator, got 'luck'
+    ValueError: seed, if no Generator, must be a whole number, 0 to 3.40282366921e+38, got 'luck'
     """
-    try:
-        return np.random.default_rng("a truth value" if isinstance(seed, bool) else seed)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a whole number from 0 on, or a Generator, got {told(seed)}") from None
+    if isinstance(seed, np.random.Generator):
+        return seed
+    return np.random.default_rng(checked_whole(f"{name}, if no Generator,", seed, 0, _MOST_SEED))
 
 
 def checked_positions(name, values, *shape):

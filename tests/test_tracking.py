@@ -362,5 +362,5 @@ def test_motion_out_of_range_is_named():
     """An error names the parameter, its value and the rule."""
     with pytest.raises(ValueError, match="order.* must be a whole number, 2 to 3"):
         Motion(order=1)
-    with pytest.raises(ValueError, match="noise must be positive and finite, got -1"):
+    with pytest.raises(ValueError, match="noise must be in 1e-06 to 1e.06, got -1"):
         Motion(noise=-1)
