@@ -211,7 +211,7 @@ def check_choice(name, value, known):
     Traceback (most recent call last):
     ValueError: control must be one of 'plain', 'pursuit', got 'plane'
     """
-    if isinstance(value, np.ndarray) or value not in list(known):
+    if not any(isinstance(value, type(each)) and value == each for each in known):
         raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}, got {told(value)}")
 
 

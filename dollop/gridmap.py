@@ -602,7 +602,8 @@ def distances_to(cells, side=1.0):
     >>> distances_to(np.array([[True, False, False], [False, False, False]]), 0.5).round(3).tolist()
     [[0.0, 0.5, 1.0], [0.5, 0.707, 1.118]]
     """
-    nearest = scipy.ndimage.distance_transform_edt(~cells, side, return_distances=False, return_indices=True)
+    asked = {"return_distances": False, "return_indices": True}
+    nearest = scipy.ndimage.distance_transform_edt(~cells, side, **asked)
     distances, columns = np.empty(cells.shape), np.arange(cells.shape[1])
     for row, (near_row, near_column) in enumerate(zip(*nearest, strict=True)):
         down, right = (near_row - row) * side, (near_column - columns) * side

@@ -34,8 +34,8 @@ STEPS, DECAY = 40, 3.0
 """A re-timed segment: its steps, and the time constants over which it decays."""
 
 MOST_STEPS = 100_000
-"""Steps of a response: one that keeps 0.9997 of its offset at each comes from 1e9 m to a micrometre in so
-many, and what is shown decays within some forty by e^3."""
+"""Steps of a response: one that keeps 0.9997 of its offset at each comes from 1e9 m to a micrometre
+in so many, and what is shown decays within some forty by e^3."""
 
 NOTHING = 1e-18
 """m^2: a squared length that counts as zero."""
@@ -94,7 +94,15 @@ class Statistics:
         -------
         Statistics
             (..., d, d), m^2.
+
+        Raises
+        ------
+        ValueError
+            For what are no positions within 1e9 m, or none at all.
         """
+        samples = checked_positions("samples", samples, "...", "N", "d")
+        if not samples.shape[-2]:
+            raise ValueError(f"samples must hold one at least, got shape {samples.shape}")
         offsets = samples - samples[..., -1:, :]
         before = np.swapaxes(offsets[..., :-1, :], -1, -2)
         return cls(before @ offsets[..., :-1, :], np.swapaxes(before @ offsets[..., 1:, :], -1, -2))

@@ -386,15 +386,7 @@ class Observer:
 
     def _map_notes(self):
         """Whether the map explains the scans, and whether they are often enough."""
-        period = float(np.median(np.diff(self.followed.t))) if len(self.followed.t) > 1 else 0.0
-        if period > SLOWEST:
-            yield Note(
-                "slow scans",
-                f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s",
-            )
-        pause = float(np.diff(self.followed.t).max(initial=0.0))
-        if pause > max(LONGEST_PAUSE, 3 * period):
-            yield Note("pause", f"there is no scan for {pause:.4g} s: nobody is followed through that")
+        yield from _clock_notes(self.followed.t)
         share = self.through / max(self.in_view, 1)
         if share > MOST_THROUGH:
             text = f"beams go through {share:.0%} of what the map has in view (at most {MOST_THROUGH:.0%})"
@@ -449,6 +441,17 @@ class Observer:
         if np.median(self.floor.first_at(places)) < since - 0.5 and not (gone[before, 4] < since - 0.5).any():
             return float(since)
         return self.followed.t[0]
+
+
+def _clock_notes(t):
+    """Whether scans at times (T,) in s are often enough, and none is far from the one before."""
+    period = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    if period > SLOWEST:
+        text = f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s"
+        yield Note("slow scans", text)
+    pause = float(np.diff(t).max(initial=0.0))
+    if pause > max(LONGEST_PAUSE, 3 * period):
+        yield Note("pause", f"there is no scan for {pause:.4g} s: nobody is followed through that")
 
 
 def part_note(place):
@@ -723,7 +726,8 @@ def observe_as_paper(
     user = user_track(log.t, tracks, users, tracker.motion)
     boxes = static_boxes(static, log.poses[-1, :2], user, min_area)
     losses = max(0, np.count_nonzero(np.diff(users, prepend=-1)) - 1)
-    return Observation(tracks, user, Environment(boxes), losses)
+    notes = (*log.notes, *_clock_notes(log.t))
+    return Observation(tracks, user, Environment(boxes), losses, notes=notes)
 
 
 def foreground_hits(log, background, background_radius=0.20):

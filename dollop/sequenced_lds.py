@@ -384,7 +384,7 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            A period that is not positive, or so short that there would be more than a million times.
+            A period that is not positive, or that makes more than a million times.
 
         Examples
         --------
@@ -396,7 +396,7 @@ class SequencedLDS:
         >>> bool(np.abs(positions[:, 0] - x[: len(t)]).max() < 0.05), float(t[-1].round(1))
         (True, 4.5)
         """
-        checked_number("period", period, *PERIODS)
+        period = checked_number("period", period, *PERIODS)
         speeds = self.speeds[:, None] if self.profile is None else self.profile
         pauses = np.zeros(len(self.segments) + 1) if self.pauses is None else self.pauses
         when, places = times_along([line.places for line in self.lines()], speeds, pauses)

@@ -686,15 +686,19 @@ def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):
     >>> identify_user(t, [slow, fast])
     array([-1, -1, -1, -1,  1,  1])
     """
-    speed, seen = np.zeros((2, len(t), len(tracks) + 1))  # the last column is nobody's, for -1
+    fastest, first, speeds = np.zeros(len(t)), np.zeros(len(t), int), []
     for k, track in enumerate(tracks):
         rows = np.searchsorted(t, track.t)
-        speed[rows, k] = np.where(track.t - track.t[0] < min_age, 0.0, track.speeds)
-        seen[rows, k] = np.where(track.occluded, 0.0, speed[rows, k])
+        speed = np.where(track.t - track.t[0] < min_age, 0.0, track.speeds)
+        seen = np.where(track.occluded, 0.0, speed)
+        ahead = seen > fastest[rows]
+        fastest[rows[ahead]], first[rows[ahead]] = seen[ahead], k
+        speeds.append(dict(zip(rows.tolist(), speed.tolist(), strict=True)))
     user, since, rival = -1, np.inf, -1
     users = np.empty(len(t), int)
-    for i, best in enumerate(seen.argmax(axis=1)):
-        leads = best != user and seen[i, best] > faster + speed[i, user]
+    for i, best in enumerate(first):
+        now = speeds[user].get(i, 0.0) if user >= 0 else 0.0
+        leads = best != user and fastest[i] > faster + now
         if not leads or best != rival:
             since, rival = (t[i], best) if leads else (np.inf, -1)
         elif t[i] - since >= patience:

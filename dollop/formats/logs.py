@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+from dollop.checks import checked_record
 from dollop.formats import carmen_log, ros_bag
 from dollop.formats.files import FormatError
+from dollop.laser import LaserLog
 
 __all__ = ["read_log", "read_odometry", "write_log"]
 
@@ -107,8 +109,9 @@ def write_log(path, log):
     FormatError
         If the name is not one of a CARMEN log.
     ValueError
-        If the beams are not evenly spaced.
+        If the beams are not evenly spaced, or it is no LaserLog.
     """
+    checked_record("log", log, LaserLog)
     _check_is_carmen(Path(path))
     carmen_log.write_log(path, log)
 

@@ -392,7 +392,7 @@ class Search:
 
 
 class Clearance:
-    """Distances in m from the robot's edge, place by place, each on the map of its period, which is not kept."""
+    """Distances in m from the robot's edge, each on the map of its period, which is not kept."""
 
     def __init__(self):
         self.known, self.places, self.told = None, [], []
