@@ -141,7 +141,7 @@ class Matching:
         if (taken[1:] == taken[:-1]).any():
             raise ValueError(f"a matching must not send two corners to one, got {told(indices.tolist())}")
         put_in(self, indices=indices, confident=checked_flag("confident", self.confident))
-        most = np.finfo(float).max
+        most = float(np.finfo(float).max)
         put_in(
             self,
             cost=checked_number("cost", self.cost, -most, most),

@@ -201,12 +201,13 @@ class Task:
         shown = checked_records("demonstrations", self.demonstrations, Demonstration)
         ways = checked_records("ways", self.ways, SequencedLDS) or (law,)
         objects = np.arange(count) if self.objects is None else self.objects
+        counts = self.shown if np.size(self.shown) else (len(shown),)
         put_in(
             self,
             demonstrations=shown,
             notes=checked_records("notes", self.notes, Note),
             ways=ways,
-            shown=tuple(checked_wholes("shown", self.shown or (len(shown),), len(ways)).tolist()),
+            shown=tuple(checked_wholes("shown", counts, len(ways)).tolist()),
             partners=tuple(map(_partners, checked_records("partners", self.partners, object))),
             objects=checked_wholes("objects", objects, "N", least=-1, most=count - 1),
             learned=checked_records("learned", self.learned, Way),

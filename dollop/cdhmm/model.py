@@ -83,7 +83,7 @@ class SubgoalHMM:
     ------
     ValueError
         Arrays that are not of one number of states, what is no probability or no covariance, and
-        states that are none or not one for each subgoal.
+        states that are not one for each subgoal, do not rise, or have no subgoal.
 
     Examples
     --------
@@ -116,6 +116,9 @@ class SubgoalHMM:
         sequences = tuple(checked_sequence(each, f"demonstration {k}") for k, each in enumerate(sequences))
         pairs = zip(states, sequences, strict=True)
         states = tuple(checked_wholes("states", each, len(shown), most=n - 1) for each, shown in pairs)
+        rising = all((np.diff(each) > 0).all() for each in states)
+        if not rising or len(np.unique(np.concatenate(states))) < n:
+            raise ValueError(f"states must rise in each sequence, and all be there, got {told(states)}")
         for each in (*sequences, *states):
             each.flags.writeable = False
         put_in(

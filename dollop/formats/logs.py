@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dollop.checks import checked_record
+from dollop.checks import checked_record, told
 from dollop.formats import carmen_log, ros_bag
 from dollop.formats.files import FormatError
 from dollop.laser import LaserLog
@@ -90,7 +90,7 @@ def _is_carmen(path, topic):
         return False
     _check_is_carmen(path)
     if topic is not None:
-        raise ValueError(f"a CARMEN log has no topics, got topic={topic!r}")
+        raise ValueError(f"a CARMEN log has no topics, got topic={told(topic)}")
     return True
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_array, checked_number, checked_positions, put_in
+from dollop.checks import check_choice, check_positive, checked_array, checked_number, checked_positions, put_in, told
 from dollop.lab.outlines import Outline
 from dollop.lab.scanner import Scanner, SickLMS200
 from dollop.pose import moved_pose
@@ -204,7 +204,7 @@ class Robot:
         put_in(self, radius=checked_number("the robot's radius", self.radius, 0.05, 2))
         put_in(self, laser_ahead=checked_number("laser_ahead", self.laser_ahead, -self.radius, self.radius))
         if not isinstance(self.scanner, Scanner):
-            raise ValueError(f"the robot's scanner must be a Scanner, got {self.scanner!r:.60}")
+            raise ValueError(f"the robot's scanner must be a Scanner, got {told(self.scanner)}")
         checked_number("the beam height", self.beam_height)
         if not LOWEST_BEAM < self.beam_height < HIGHEST_BEAM:
             rule = f"the beam height must be over feet, {LOWEST_BEAM} m, and below shoulders, {HIGHEST_BEAM} m"
@@ -325,7 +325,7 @@ class Move:
 def whole(name, value, least, most):
     """A whole number within bounds as an int."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer) or not least <= value <= most:
-        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {value!r:.60}")
+        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {told(value)}")
     if value != int(value):
         raise ValueError(f"{name} must be a whole number, {least} to {most}, got {value}")
     return int(value)

@@ -422,7 +422,7 @@ def drive(keeper, robot, kidnap, timeout, localise_within, clearance):
         now = len(records) * robot.period
         if kidnap and now > kidnap[0][0] - robot.period / 2:
             robot.place(kidnap.pop(0)[1])
-        x, y, theta = pose = robot.pose
+        x, y, theta = pose = tuple(map(float, robot.pose))
         touching = getattr(robot, "touching", None)
         true_pose = getattr(robot, "true_pose", pose)
         finite = isfinite(x + y + theta)
