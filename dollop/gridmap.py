@@ -10,18 +10,30 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from dollop.checks import check_positive, checked_array, put_in
+from dollop.checks import (
+    FARTHEST,
+    checked_array,
+    checked_number,
+    checked_positions,
+    checked_record,
+    checked_wholes,
+    put_in,
+)
 from dollop.formats import carmen_map, ros_bag
 from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, from_file
 from dollop.formats.writing import checked_path
+from dollop.laser import LaserLog
 
 __all__ = [
-    "OccupancyGrid", "check_is_map", "covered_cells", "distances_to", "flat_cells", "in_cells", "in_metres",
+    "SIDES", "OccupancyGrid", "check_is_map", "covered_cells", "distances_to", "flat_cells", "in_cells", "in_metres",
     "map_inputs", "map_outputs",
 ]  # fmt: skip
 
 MAX_CELLS = 100_000_000
+MOST_ALONG = 1_000_000
+SIDES = 1e-6, 1e3
+"""m: cells of a map are neither smaller nor larger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +55,8 @@ class OccupancyGrid:
     Raises
     ------
     ValueError
-        If the occupancy is not a grid of probabilities, or resolution or origin are not usable.
+        If the occupancy is not a grid of probabilities, a side of a cell is below a micrometre or
+        beyond a kilometre, or the origin beyond 1e9 m.
 
     Examples
     --------
@@ -65,9 +78,13 @@ class OccupancyGrid:
         wrong = (cells < 0) | (cells > 1)
         if wrong.any():
             raise ValueError(f"occupancy must be in [0, 1] or NaN, got {cells[wrong][0]}")
-        origin = tuple(checked_array("origin", self.origin, 2).tolist())
-        check_positive("resolution", float(self.resolution))
-        put_in(self, occupancy=cells, origin=origin, resolution=float(self.resolution))
+        origin = tuple(checked_positions("origin", self.origin, 2).tolist())
+        put_in(
+            self,
+            occupancy=cells,
+            origin=origin,
+            resolution=checked_number("resolution", self.resolution, *SIDES),
+        )
 
     def __repr__(self):
         height, width = self.occupancy.shape
@@ -121,8 +138,9 @@ class OccupancyGrid:
         >>> grid.free[tuple(grid.world_to_cell([0.3, 0.0]))].item()
         True
         """
-        check_positive("resolution", resolution)
-        check_positive("max_range", max_range)
+        checked_record("log", log, LaserLog)
+        resolution = checked_number("resolution", resolution, *SIDES)
+        max_range = checked_number("max_range", max_range, SIDES[0])
         reach = np.minimum(log.ranges, min(max_range, log.max_range))
         bearings = log.poses[:, 2, None] + log.angles
         directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
@@ -210,14 +228,19 @@ class OccupancyGrid:
         Parameters
         ----------
         points : (..., 2) array_like
-            x, y in m, finite.
+            x, y in m, within 1e9 m.
 
         Returns
         -------
         (..., 2) int array
             Row and column.
+
+        Raises
+        ------
+        ValueError
+            For what are no positions.
         """
-        x, y = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+        x, y = np.moveaxis(checked_positions("points", points, "...", 2), -1, 0)
         column, row = in_cells(x, y, self.origin, self.resolution)
         return np.floor(np.stack([row, column], axis=-1)).astype(int)
 
@@ -233,8 +256,13 @@ class OccupancyGrid:
         -------
         (..., 2) float array
             x, y in m.
+
+        Raises
+        ------
+        ValueError
+            For what are no numbers of cells.
         """
-        row, column = np.moveaxis(np.asarray(cells), -1, 0)
+        row, column = np.moveaxis(checked_wholes("cells", cells, "...", 2, least=-FARTHEST), -1, 0)
         return np.stack(in_metres(column + 0.5, row + 0.5, self.origin, self.resolution), axis=-1)
 
     def covers(self, points):
@@ -248,9 +276,14 @@ class OccupancyGrid:
         Returns
         -------
         (...,) bool array
+
+        Raises
+        ------
+        ValueError
+            For what are not two numbers each.
         """
         xmin, xmax, ymin, ymax = self.extent
-        x, y = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+        x, y = np.moveaxis(checked_array("points", points, "...", 2, finite=False), -1, 0)
         return (x >= xmin) & (x < xmax) & (y >= ymin) & (y < ymax)
 
     def distance_field(self):
@@ -288,6 +321,11 @@ class OccupancyGrid:
         float
             In m; `inf` where there is no way, or only a longer one.
 
+        Raises
+        ------
+        ValueError
+            What is no place, a negative radius or length, places a million cells apart.
+
         Examples
         --------
         Round a wall of 1 m that ends at the border of the map there is no way.
@@ -296,13 +334,18 @@ class OccupancyGrid:
         >>> grid.way_length((0.2, 0.5), (0.2, 0.9)), grid.way_length((0.2, 0.5), (1.8, 0.5))
         (0.4, inf)
         """
-        place, other = np.asarray(place, dtype=float), np.asarray(other, dtype=float)
+        place, other = checked_positions("place", place, 2), checked_positions("other", other, 2)
+        radius, most = checked_number("radius", radius, 0), checked_number("most", most, 0, np.inf)
         straight = float(np.linalg.norm(other - place))
+        if straight > MOST_ALONG * self.resolution:
+            raise ValueError(f"a way must be at most {MOST_ALONG} cells long, got {straight:g} m")
         line = place + np.linspace(0, 1, 2 + int(straight / self.resolution))[:, None] * (other - place)
         near = self.distance_at(line)
         if not (near <= self.resolution).any():
             return straight
         free, origin, side, graph = self._walkable(radius)
+        if not len(free):
+            return np.inf
         start, goal = (self._nearest_free(each, free, origin, side) for each in (place, other))
         length = scipy.sparse.csgraph.dijkstra(graph, directed=False, indices=start, limit=most)[goal]
         return max(straight, float(length))
@@ -349,8 +392,13 @@ class OccupancyGrid:
         (...,) float array
             Metres; NaN off the map, where nothing is known (see `covers`), so that it is neither
             near nor far.
+
+        Raises
+        ------
+        ValueError
+            For what are not two numbers each.
         """
-        points = np.asarray(points, dtype=float)
+        points = checked_array("points", points, "...", 2, finite=False)
         inside = self.covers(points)
         rows, cols = self.world_to_cell(points[inside]).T
         distances = np.full(inside.shape, np.nan)

@@ -222,7 +222,7 @@ def _check_ending(fields, used):
 
 
 def _numbers(fields):
-    return checked_array("the numbers of a message", fields, "N")
+    return checked_array("the numbers of a message", list(map(float, fields)), "N")
 
 
 def write_log(path, log):

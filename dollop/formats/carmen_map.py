@@ -85,7 +85,8 @@ def _map_origin(path, head, resolution):
     found = re.search(rb"^# Lower left    : (.*)$", head, re.MULTILINE)
     if not found:
         return -resolution / 2, -resolution / 2
-    return tuple(from_file(path, checked_array, "the lower left corner", found[1].split(), 2).tolist())
+    corner = from_file(path, np.array, found[1].split(), float)
+    return tuple(from_file(path, checked_array, "the lower left corner", corner, 2).tolist())
 
 
 def outputs(path):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_number, checked_numbers, checked_positions, put_in
+from dollop.checks import check_choice, check_positive, checked_array, checked_number, checked_positions, put_in, told
 from dollop.lab.outlines import Outline
 from dollop.lab.scanner import Scanner, SickLMS200
 from dollop.pose import moved_pose
@@ -74,7 +74,7 @@ class Object:
     def __post_init__(self):
         check_choice("shape", self.shape, SHAPES)
         for name in ("position", "size"):
-            object.__setattr__(self, name, tuple(checked_numbers(name, getattr(self, name), 2).tolist()))
+            object.__setattr__(self, name, tuple(checked_array(name, getattr(self, name), 2).tolist()))
         check_positive("size", min(self.size))
         numbers = {"height": (1e-3, FARTHEST), "turn": (-FARTHEST, FARTHEST), "top": (0, 100), "foot": (0, 100)}
         put_in(self, **{name: checked_number(name, getattr(self, name), *ends) for name, ends in numbers.items()})
@@ -198,13 +198,13 @@ class Robot:
     radius: float = 0.25
 
     def __post_init__(self):
-        object.__setattr__(self, "pose", tuple(checked_numbers("the robot's pose", self.pose, 3).tolist()))
+        object.__setattr__(self, "pose", tuple(checked_array("the robot's pose", self.pose, 3).tolist()))
         object.__setattr__(self, "way", as_places("the robot's way", self.way))
         put_in(self, speed=checked_number("the robot's speed", self.speed, 0.01, 2))
         put_in(self, radius=checked_number("the robot's radius", self.radius, 0.05, 2))
         put_in(self, laser_ahead=checked_number("laser_ahead", self.laser_ahead, -self.radius, self.radius))
         if not isinstance(self.scanner, Scanner):
-            raise ValueError(f"the robot's scanner must be a Scanner, got {self.scanner!r:.60}")
+            raise ValueError(f"the robot's scanner must be a Scanner, got {told(self.scanner)}")
         checked_number("the beam height", self.beam_height)
         if not LOWEST_BEAM < self.beam_height < HIGHEST_BEAM:
             rule = f"the beam height must be over feet, {LOWEST_BEAM} m, and below shoulders, {HIGHEST_BEAM} m"
@@ -263,7 +263,7 @@ class Person:
 
     def __post_init__(self):
         object.__setattr__(self, "places", as_places("a person's places", self.places))
-        object.__setattr__(self, "times", tuple(checked_numbers("times", self.times, "K").tolist()))
+        object.__setattr__(self, "times", tuple(checked_array("times", self.times, "K").tolist()))
         if not self.places:
             raise ValueError("a person needs a place to be, got none")
         check_choice("body", self.body, BODIES)
@@ -317,7 +317,7 @@ class Move:
     seconds: float = 1.0
 
     def __post_init__(self):
-        object.__setattr__(self, "to", tuple(checked_numbers("to", self.to, 2).tolist()))
+        object.__setattr__(self, "to", tuple(checked_array("to", self.to, 2).tolist()))
         put_in(self, begin=checked_number("begin", self.begin, 0, LONGEST))
         put_in(self, seconds=checked_number("seconds", self.seconds, 0.01, LONGEST))
 
@@ -325,7 +325,7 @@ class Move:
 def whole(name, value, least, most):
     """A whole number within bounds as an int."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer) or not least <= value <= most:
-        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {value!r:.60}")
+        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {told(value)}")
     if value != int(value):
         raise ValueError(f"{name} must be a whole number, {least} to {most}, got {value}")
     return int(value)
@@ -335,4 +335,4 @@ def as_places(name, values):
     """Places (K, 2) as a tuple of tuples."""
     if isinstance(values, tuple | list) and not values:
         return ()
-    return tuple(map(tuple, checked_positions(name, checked_numbers(name, values, "N", 2)).tolist()))
+    return tuple(map(tuple, checked_positions(name, checked_array(name, values, "N", 2)).tolist()))

@@ -22,7 +22,7 @@ from math import pi
 import numpy as np
 import scipy
 
-from dollop.checks import checked_array
+from dollop.checks import checked_array, checked_generator
 from dollop.gridmap import covered_cells, distances_to, in_cells
 from dollop.pose import rotation
 from dollop.robot.avoidance import FREE_BELOW
@@ -106,7 +106,7 @@ class MonteCarloLocalizer:
     """
 
     def __init__(self, background, angles, environment=None, pose=None, laser_offset=0.0, seed=0):
-        self._rng = np.random.default_rng(seed)
+        self._rng = checked_generator("seed", seed)
         self._bearings = np.asarray(angles, dtype=float)[::BEAM_STEP]
         self._laser_offset = laser_offset
         blocked, frame = background.occupied, (background.origin, background.resolution)
