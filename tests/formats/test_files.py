@@ -33,7 +33,7 @@ def test_gzip_is_told_by_content(tmp_path):
     assert read_bytes(tmp_path / "a.log") == read_bytes(tmp_path / "b.gz") == b"text"
 
 
-def test_unreadable_files_are_refused(tmp_path, monkeypatch):
+def test_unreadable_files_are_refused(tmp_path):
     """Empty, cut short, damaged and oversized files each give a FormatError that says so."""
     packed = gzip.compress(np.random.default_rng(0).bytes(1000))
     contents = {
@@ -42,11 +42,10 @@ def test_unreadable_files_are_refused(tmp_path, monkeypatch):
         "damaged": packed[:100] + b"\0\1\2" + packed[103:],
         "more than 2000 bytes": gzip.compress(b"a" * 3000),
     }
-    monkeypatch.setattr(files, "MAX_BYTES", 2000)
     for message, content in contents.items():
         (tmp_path / "f").write_bytes(content)
         with pytest.raises(FormatError, match=message):
-            read_bytes(tmp_path / "f")
+            read_bytes(tmp_path / "f", 2000)
 
 
 def test_what_a_check_refuses_is_the_fault_of_the_file():
