@@ -1,24 +1,42 @@
 """Laser scans, odometry and maps from ROS 1 and ROS 2 bags, through rosbags (the extra `ros`)."""
 
+import bz2
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from dollop.checks import need
-from dollop.formats.files import FormatError, from_file
+from dollop.checks import checked_array, need
+from dollop.formats.files import FormatError, check_cells, from_file
 from dollop.formats.odometry import Odometry
 from dollop.formats.ros_frames import Link, laser_poses, planar
-from dollop.formats.scans import Beams, Scan, doubtful, forgive_disorder, no_return_from, usable_scans
+from dollop.formats.scans import (
+    MAX_READINGS,
+    Beams,
+    Scan,
+    check_beams,
+    check_metres,
+    doubtful,
+    forgive_disorder,
+    no_return_from,
+    usable_scans,
+)
 from dollop.laser import LaserLog
 
 __all__ = ["SUFFIXES", "is_bag", "read_log", "read_map", "read_odometry"]
 
 SUFFIXES = (".bag", ".mcap", ".db3")
-SCAN, ODOMETRY, GRID = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "nav_msgs/msg/OccupancyGrid"
+SCAN, ODOMETRY, GRID = (
+    "sensor_msgs/msg/LaserScan",
+    "nav_msgs/msg/Odometry",
+    "nav_msgs/msg/OccupancyGrid",
+)
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 USUAL = {SCAN: None, ODOMETRY: "odom", GRID: "map"}
 """Which topic of a type is meant if there are several and none is named."""
+MAX_CHUNK = 1 << 26
+"""Bytes that a chunk of a ROS 1 bag may unpack to: rosbag writes 768 KiB, and bzip2 packs a gigabyte into one."""
 
 
 def is_bag(path):
@@ -66,8 +84,9 @@ def read_log(path, topic=None):
     ImportError
         If rosbags is not installed.
     FormatError
-        If the file is no bag, holds no such topic or several to choose from, or more than a few
-        scans are broken.
+        If the file is no bag, holds no such topic or several to choose from, more than a few scans
+        are broken, or one has beams or ranges that no laser has; or if there are more than 100
+        million readings, or a chunk of a ROS 1 bag unpacks to more than 64 MiB.
 
     Warns
     -----
@@ -76,12 +95,10 @@ def read_log(path, topic=None):
         (`dollop.formats.scans.usable_scans`), or the poses are guesses.
     """
     with _opened(path) as bag:
-        messages = list(_messages(path, bag, SCAN, topic))
-        scans = dict(enumerate(map(_scan, messages), 1))
+        scans, frame = _scans(path, _messages(path, bag, SCAN, topic))
         links, odometry = _links(bag), _driven(bag)
     if not scans:
         raise FormatError("the topic holds no scan", path)
-    frame = messages[0].header.frame_id.strip("/")
     scans, t, notes = usable_scans(path, scans, {})
     beams, ranges = scans[0].beams, np.array([scan.ranges for scan in scans])
     if np.array_equal(t, [scan.t for scan in scans]):
@@ -129,7 +146,8 @@ def read_odometry(path, topic=None):
         rows = [_odometry(message) for message in _messages(path, bag, ODOMETRY, topic)]
     if not rows:
         raise FormatError("the topic holds no odometry", path)
-    rows = np.array(rows)
+    rows = from_file(path, checked_array, "odometry", rows, "N", 7)
+    from_file(path, check_metres, "odometry", rows[:, 1:3])
     rows = rows[forgive_disorder(path, rows[:, 0], "Odometry")]
     return Odometry(rows[:, 0], rows[:, 1:4], rows[:, 5:7])
 
@@ -166,9 +184,10 @@ def read_map(path, topic=None):
     if not grids:
         raise FormatError("the topic holds no map", path)
     frame = grids[-1].info
+    from_file(path, check_cells, frame.width, frame.height)
     percent = np.array(grids[-1].data, float).reshape(frame.height, frame.width)
     x, y, turn, _ = planar(frame.origin.position, frame.origin.orientation)
-    if abs(turn) > 1e-6:
+    if not abs(turn) <= 1e-6:
         raise FormatError(f"a turned map is not supported, got {turn:g} rad", path)
     return np.where(percent < 0, np.nan, percent / 100), (x, y), float(frame.resolution)
 
@@ -182,11 +201,38 @@ def _opened(path):
 
     try:
         with AnyReader([Path(path)], default_typestore=get_typestore(Stores.LATEST)) as bag:
+            _bound(bag.readers)
             yield bag
     except FormatError:
         raise
     except Exception as error:
-        raise FormatError(f"not a readable ROS bag ({error or type(error).__name__})", path) from None
+        raise FormatError(f"not a readable ROS bag ({str(error) or type(error).__name__})", path) from None
+
+
+def _bound(readers):
+    """Let no chunk of a ROS 1 bag unpack to more than there is room for."""
+    for reader in readers:
+        chunks = getattr(reader, "chunks", {})
+        for place, chunk in chunks.items():
+            if hasattr(chunk, "decompressor"):
+                chunks[place] = chunk._replace(decompressor=partial(_unpacked, whole=chunk.decompressor))
+
+
+def _unpacked(packed, whole):
+    """A chunk of a ROS 1 bag, as long as it is no longer than `MAX_CHUNK`; `whole` is what rosbags unpacks with."""
+    import lz4.frame
+
+    bounded = {
+        bz2.decompress: bz2.BZ2Decompressor,
+        lz4.frame.decompress: lz4.frame.LZ4FrameDecompressor,
+    }
+    if whole in bounded:
+        content = bounded[whole]().decompress(packed, MAX_CHUNK + 1)
+    else:
+        content = whole(packed)
+    if len(content) > MAX_CHUNK:
+        raise ValueError(f"a chunk unpacks to more than {MAX_CHUNK} bytes, the most that is read")
+    return content
 
 
 def _messages(path, bag, kind, topic):
@@ -213,11 +259,24 @@ def _all_of(bag, wanted):
     return (bag.deserialize(data, c.msgtype) for c, _, data in raw)
 
 
+def _scans(path, messages):
+    """Scans by their number, and the laser's frame."""
+    scans, frame, room = {}, "", MAX_READINGS
+    for number, message in enumerate(messages, 1):
+        scans[number] = from_file(path, _scan, message)
+        frame, room = message.header.frame_id if number == 1 else frame, room - len(message.ranges)
+        if room < 0:
+            raise FormatError(f"more than {MAX_READINGS} readings, the most that is read", path)
+    return scans, frame.strip("/")
+
+
 def _scan(message):
     """A message as a scan, what is no measurement as `inf`."""
     ranges = np.array(message.ranges, dtype=float)
     measured = (ranges >= message.range_min) & (ranges <= message.range_max)
     beams = Beams(ranges.size, message.angle_min, message.angle_increment, message.range_max)
+    check_beams(beams)
+    check_metres("a range", np.where(measured & np.isfinite(ranges), ranges, 0))
     return Scan(beams, np.where(measured, ranges, np.inf), (0, 0, 0), _seconds(message.header.stamp))
 
 
