@@ -10,14 +10,19 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from dollop.checks import check_positive, checked_array, put_in
+from dollop.checks import FARTHEST, check_positive, checked_array, put_in
 from dollop.formats import carmen_map, ros_bag
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.formats.files import FormatError, from_file
+from dollop.formats.files import FormatError, check_cells, from_file
 
 __all__ = ["OccupancyGrid", "check_is_map", "covered_cells", "flat_cells", "in_cells", "in_metres"]
 
-MAX_CELLS = 100_000_000
+SMALLEST = 1e-6
+"""Side of a cell in m: smaller ones could not be counted to where a map may end."""
+FINEST = 1e-3
+"""m: no laser tells more, and a beam passes so many cells."""
+READINGS, POINTS = 100_000, 1_000_000
+"""Beams, and cells along them, that are counted at once: some 100 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +44,8 @@ class OccupancyGrid:
     Raises
     ------
     ValueError
-        If the occupancy is not a grid of probabilities, or resolution or origin are not usable.
+        If the occupancy is not a grid of probabilities, or the map is not within 1e9 m of the origin, its
+        cells smaller than a micrometre.
 
     Examples
     --------
@@ -62,7 +68,7 @@ class OccupancyGrid:
         if wrong.any():
             raise ValueError(f"occupancy must be in [0, 1] or NaN, got {cells[wrong][0]}")
         origin = tuple(checked_array("origin", self.origin, 2).tolist())
-        check_positive("resolution", float(self.resolution))
+        _check_place(origin, float(self.resolution), cells.shape)
         put_in(self, occupancy=cells, origin=origin, resolution=float(self.resolution))
 
     def __repr__(self):
@@ -97,8 +103,8 @@ class OccupancyGrid:
         Raises
         ------
         ValueError
-            If the grid would have more than 100 million cells, or a parameter is not positive and
-            finite.
+            If the grid would have more than 25 million cells or not lie within 1e9 m of the origin, if
+            `max_range` is not positive and finite, or `resolution` not from 1 mm to `max_range`.
 
         Notes
         -----
@@ -119,20 +125,12 @@ class OccupancyGrid:
         """
         check_positive("resolution", resolution)
         check_positive("max_range", max_range)
+        if not FINEST <= resolution <= max_range:
+            raise ValueError(f"resolution must be in {FINEST:g} to max_range = {max_range:g} m, got {resolution:g} m")
         reach = np.minimum(log.ranges, min(max_range, log.max_range))
-        bearings = log.poses[:, 2, None] + log.angles
-        directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
-        ends = log.poses[:, None, :2] + reach[..., None] * directions
-        frame = _frame(np.vstack([*ends, log.poses[:, :2]]), resolution)
-        is_hit = log.ranges <= max_range
-        # A cell's diagonal before its hit a beam has left no trace yet in the cell that it hits.
-        steps = (reach / resolution - np.sqrt(2) * is_hit).astype(int).clip(0)
-        some = np.array_split(np.arange(len(log)), 1 + steps.size // 10_000)
-        passed = (_passed(log, scans, directions, steps, resolution) for scans in some)
-        passes = sum(_counts(points, *frame) for points in passed)
-        hits = _counts(ends[is_hit], *frame)
-        seen = hits + passes
-        return cls(np.divide(hits, seen, out=np.full(seen.shape, np.nan), where=seen > 0), *frame[:2])
+        some = np.array_split(np.arange(len(log)), min(len(log), 1 + reach.size // READINGS))
+        frame = _frame(np.vstack([_bounds(log, scans, reach) for scans in some]), resolution)
+        return cls(_occupancy(log, some, reach, log.ranges <= max_range, *frame), *frame[:2])
 
     @classmethod
     def load(cls, path):
@@ -311,7 +309,12 @@ class OccupancyGrid:
             number = np.full(free.shape, -1)
             number[free] = np.arange(free.sum())
             side, links = stride * self.resolution, []
-            for rows, columns, far in ((0, 1, 1.0), (1, 0, 1.0), (1, 1, np.sqrt(2)), (1, -1, np.sqrt(2))):
+            for rows, columns, far in (
+                (0, 1, 1.0),
+                (1, 0, 1.0),
+                (1, 1, np.sqrt(2)),
+                (1, -1, np.sqrt(2)),
+            ):
                 a = number[: number.shape[0] - rows, max(0, -columns) : number.shape[1] - max(0, columns)]
                 b = number[rows:, max(0, columns) : number.shape[1] - max(0, -columns)]
                 both = (a >= 0) & (b >= 0)
@@ -376,14 +379,64 @@ def _format_of(path):
     return ros_map
 
 
+def _check_place(origin, resolution, shape):
+    """A map's cells are of some size, and none of them is farther than metres can be."""
+    check_positive("resolution", resolution)
+    ends = np.abs([origin, np.add(origin, np.multiply(shape[::-1], resolution))]).max()
+    if not (resolution >= SMALLEST and ends <= FARTHEST):
+        rule = f"a map must lie within {FARTHEST:g} m of the origin, its cells of {SMALLEST:g} m or more"
+        raise ValueError(f"{rule}, got {ends:g} m and cells of {resolution:g} m")
+
+
+def _rays(log, scans, reach):
+    """Beams of some scans: where they begin, their directions and where they end, (N, 2) each."""
+    bearings = log.poses[scans, 2, None] + log.angles
+    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+    begins = np.broadcast_to(log.poses[scans, None, :2], directions.shape)
+    ends = begins + reach[scans, :, None] * directions
+    return tuple(each.reshape(-1, 2) for each in (begins, directions, ends))
+
+
+def _bounds(log, scans, reach):
+    """Corners (2, 2) of the box round all beams of some scans."""
+    begins, _, ends = _rays(log, scans, reach)
+    both = np.vstack([ends, begins])
+    return np.array([both.min(axis=0), both.max(axis=0)])
+
+
 def _frame(points, resolution):
     """Corner, resolution and shape of a grid that holds the points (M, 2), with a cell to spare."""
+    farthest = np.abs(points).max()
+    if not farthest <= FARTHEST:
+        raise ValueError(f"a map must lie within {FARTHEST:g} m of the origin, got {farthest:g} m")
     left, low = np.floor(points.min(axis=0) / resolution) - 1
     right, high = np.floor(points.max(axis=0) / resolution) + 2
     columns, rows = right - left, high - low
-    if not columns * rows <= MAX_CELLS:
-        raise ValueError(f"{columns} x {rows} cells of {resolution} m are more than {MAX_CELLS}")
+    check_cells(columns, rows)
     return (left * resolution, low * resolution), resolution, (int(rows), int(columns))
+
+
+def _occupancy(log, some, reach, is_hit, origin, resolution, shape):
+    """Hits by hits and passes (H, W), NaN where there is neither, counted in some scans after others."""
+    hits, passes = (np.zeros(shape, dtype=int) for _ in range(2))
+    for scans in some:
+        begins, directions, ends = _rays(log, scans, reach)
+        hits += _counts(ends[is_hit[scans].ravel()], origin, resolution, shape)
+        # A cell's diagonal before its hit a beam has left no trace yet in the cell that it hits.
+        steps = (reach[scans] / resolution - np.sqrt(2) * is_hit[scans]).astype(int).clip(0).ravel()
+        # A laser that stands still must not step over the same corners in every scan: the golden
+        # ratio spreads the phases.
+        phases = np.repeat(scans * ((np.sqrt(5) - 1) / 2) % 1, reach.shape[1])
+        for few in np.split(np.arange(len(steps)), _cuts(steps)):
+            points = _passed(begins[few], directions[few], steps[few], phases[few], resolution)
+            passes += _counts(points, origin, resolution, shape)
+    passes += hits
+    return np.divide(hits, passes, out=np.full(shape, np.nan), where=passes > 0)
+
+
+def _cuts(steps):
+    """Where to cut beams of so many steps (N,) into parts, so that none has many more than `POINTS` in all."""
+    return 1 + np.flatnonzero(np.diff(np.cumsum(steps) // POINTS))
 
 
 def _counts(points, origin, resolution, shape):
@@ -392,15 +445,11 @@ def _counts(points, origin, resolution, shape):
     return np.bincount(cells, minlength=shape[0] * shape[1]).reshape(shape)
 
 
-def _passed(log, scans, directions, steps, resolution):
-    """Points a cell apart along the beams of some scans, as many as there are `steps` (T, B)."""
-    steps = steps[scans]
-    along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps.ravel(), steps.ravel())
-    # A laser that stands still must not step over the same corners in every scan: the golden ratio
-    # spreads the phases.
-    along = along + np.repeat(scans * ((np.sqrt(5) - 1) / 2) % 1, steps.sum(axis=1))
-    starts = np.repeat(log.poses[scans, :2], steps.sum(axis=1), axis=0)
-    ways = np.repeat(directions[scans].reshape(-1, 2), steps.ravel(), axis=0)
+def _passed(begins, directions, steps, phases, resolution):
+    """Points a cell apart along beams (N, 2), as many as there are `steps` (N,), the first by phases of a cell."""
+    along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
+    along = along + np.repeat(phases, steps)
+    starts, ways = np.repeat(begins, steps, axis=0), np.repeat(directions, steps, axis=0)
     return starts + ways * (along * resolution)[:, None]
 
 
