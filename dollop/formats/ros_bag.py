@@ -226,10 +226,7 @@ def _unpacked(packed, whole):
         bz2.decompress: bz2.BZ2Decompressor,
         lz4.frame.decompress: lz4.frame.LZ4FrameDecompressor,
     }
-    if whole in bounded:
-        content = bounded[whole]().decompress(packed, MAX_CHUNK + 1)
-    else:
-        content = whole(packed)
+    content = bounded[whole]().decompress(packed, MAX_CHUNK + 1) if whole in bounded else whole(packed)
     if len(content) > MAX_CHUNK:
         raise ValueError(f"a chunk unpacks to more than {MAX_CHUNK} bytes, the most that is read")
     return content

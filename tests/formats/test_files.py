@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dollop.formats import files
 from dollop.formats.files import FormatError, from_file, read_bytes, warn_of
 
 

@@ -89,20 +89,8 @@ def test_bags_without_rosbags_say_what_to_install(tmp_path, monkeypatch):
     [
         ("carmen_logs/intel-corrected.log.gz", (906, 180), 80.0, "left out 4 of 910", []),
         ("carmen_logs/edmonton-corrected.log.gz", (340, 180), 51.09, None, ["sensor"]),
-        (
-            "carmen_logs/csail-corrected.log.gz",
-            (406, 361),
-            80.0,
-            "404 of 406 scans are out",
-            ["clock"],
-        ),
-        (
-            "carmen_logs/orebro-corrected.log.gz",
-            (237, 181),
-            32.759,
-            "236 of 237 scans are out",
-            ["clock"],
-        ),
+        ("carmen_logs/csail-corrected.log.gz", (406, 361), 80.0, "404 of 406 scans are out", ["clock"]),
+        ("carmen_logs/orebro-corrected.log.gz", (237, 181), 32.759, "236 of 237 scans are out", ["clock"]),
         ("people/demo_stationary_simple_environment.bag", (1265, 512), 5.6, None, ["poses"]),
         ("people/walker_1.bag", (400, 768), 11.0, None, ["poses"]),
     ],

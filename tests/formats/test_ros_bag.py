@@ -211,11 +211,7 @@ def odometry(topic="/odom", child="base_link", times=TIMES, poses=DRIVE):
 
         none = np.zeros(36)
         for t, (x, y, yaw) in zip(times, poses, strict=True):
-            pose = of(
-                "PoseWithCovariance",
-                of("Pose", of("Point", x, y, 0.0), quaternion(store, yaw)),
-                none,
-            )
+            pose = of("PoseWithCovariance", of("Pose", of("Point", x, y, 0.0), quaternion(store, yaw)), none)
             twist = of("Twist", of("Vector3", 0.3, 0.0, 0.0), of("Vector3", 0.0, 0.0, 0.1))
             twist = of("TwistWithCovariance", twist, none)
             yield store.types[ODOMETRY](header(store, t, "odom"), child, pose, twist)
@@ -237,20 +233,9 @@ BY_ODOMETRY = [("poses", False, "frame 'odom', by odometry, which drifts")]
         [transforms("/tf", "base_link", "laser", TIMES, [MOUNT] * 7), odometry()],
         [STATIC, DRIVEN, odometry(poses=0 * DRIVE)],
         [STATIC, odometry(), odometry("/wheels", poses=0 * DRIVE)],
-        [
-            STATIC,
-            transforms("/tf_static", "base_footprint", "base_link", poses=[(9, 9, 0)]),
-            odometry(),
-        ],
+        [STATIC, transforms("/tf_static", "base_footprint", "base_link", poses=[(9, 9, 0)]), odometry()],
     ],
-    ids=[
-        "tf",
-        "odom",
-        "mount on tf",
-        "tf before odom",
-        "two odometries",
-        "a frame below the robot's",
-    ],
+    ids=["tf", "odom", "mount on tf", "tf before odom", "two odometries", "a frame below the robot's"],
 )
 def test_poses_by_odometry(tmp_path, version, beside, recwarn):
     """Interpolated at the scan, and the laser's, not the robot's; a note says that they drift."""
@@ -280,12 +265,7 @@ def test_poses_in_the_map(tmp_path, prefix):
 
 @pytest.mark.parametrize(
     "beside",
-    [
-        [],
-        [STATIC],
-        [transforms("/tf", "base_link", "laser")],
-        [transforms("/tf", "odom", "base_link", (), ())],
-    ],
+    [[], [STATIC], [transforms("/tf", "base_link", "laser")], [transforms("/tf", "odom", "base_link", (), ())]],
 )
 def test_a_bag_that_tells_no_motion(tmp_path, beside, recwarn):
     """The laser is taken to stand still at the origin, and a note says so."""
@@ -318,10 +298,7 @@ def test_a_laser_that_hangs(tmp_path):
 def test_what_hangs_from_what_hangs(tmp_path):
     """Behind a frame that hangs left is right, and what hangs from that stands upright again."""
     beside = [transforms("/tf_static", "base_link", "arm", poses=[(1, 0, 0)], roll=np.pi)]
-    beside += [
-        transforms("/tf_static", "arm", "laser", poses=[(0, 0.5, 0.2)], roll=np.pi),
-        odometry(),
-    ]
+    beside += [transforms("/tf_static", "arm", "laser", poses=[(0, 0.5, 0.2)], roll=np.pi), odometry()]
     log = read_log(write_bag(tmp_path / "a.bag", "1", {"/scan": scans_of}, beside))
     np.testing.assert_allclose(log.poses, composed(AT_SCANS, (1, -0.5, -0.2)), atol=1e-9)
     assert log.angles[0] == -1.0
@@ -329,10 +306,7 @@ def test_what_hangs_from_what_hangs(tmp_path):
 
 DOUBTS = {
     "no transform leads from 'laser' to 'base_link'": [odometry()],
-    "tilted by 30 degrees": [
-        transforms("/tf_static", "base_link", "laser", roll=np.pi / 6),
-        odometry(),
-    ],
+    "tilted by 30 degrees": [transforms("/tf_static", "base_link", "laser", roll=np.pi / 6), odometry()],
     "1 of 3 poses are a guess": [STATIC, odometry(times=[98.0, 99.15], poses=DRIVE[:2])],
     "3 of 3 scans are more than 1 s from every": [STATIC, odometry(times=TIMES + 50)],
 }

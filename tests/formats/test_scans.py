@@ -12,15 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dollop.formats.files import FormatError
-from dollop.formats.scans import (
-    Beams,
-    Scan,
-    _usable_clock,
-    forgive,
-    longest_rise,
-    no_return_from,
-    usable_scans,
-)
+from dollop.formats.scans import Beams, Scan, _usable_clock, forgive, longest_rise, no_return_from, usable_scans
 
 
 @given(st.lists(st.integers(0, 5), max_size=8))

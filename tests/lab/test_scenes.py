@@ -299,8 +299,8 @@ def test_text_true_and_what_no_float_holds_are_no_numbers_on_file(tmp_path, path
     """In a scene's file they raise FormatError that names the file, the field and the value."""
     file = tmp_path / "room.json"
     file.write_text(json.dumps(with_part(full_scene(), path, value)))
-    told = repr(value)[:40]
-    with pytest.raises(FormatError, match=f"room.json: {name} must be a finite number.*, got {told}"):
+    rule = f"{name} must be a finite number" if value != 10**400 else "not a scene: a number must be finite"
+    with pytest.raises(FormatError, match=f"room.json: {rule}.*, got {repr(value)[:20]}"):
         Scene.load(file)
 
 
@@ -321,7 +321,7 @@ def test_no_number_is_larger_than_a_float():
     """Wherever in a scene 10**400 is put in place of a number, ValueError tells of it."""
     content = full_scene()
     for path in numbers(content):
-        with pytest.raises(ValueError, match="1000000"):
+        with pytest.raises(ValueError, match="1000000|a whole number of some 401 digits"):
             Scene.from_dict(with_part(content, path, 10**400))
 
 
