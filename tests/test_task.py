@@ -156,7 +156,7 @@ def damaged(change):
         (damaged(lambda c: c["segments"][0].update(G0=[[1, 0], [0, 1]], G1=[[2, 0], [0, 2]])), "spectral radius"),
         (damaged(lambda c: c.update(environment={"boxes": c["environment"]["boxes"][:1]})), "must be below"),
         (damaged(lambda c: c.update(version=True)), "version must be 1 or 2, got True"),
-        (damaged(lambda c: c["segments"][0].update(G0=[[1, None], [0, 1]])), "must be finite"),
+        (damaged(lambda c: c["segments"][0].update(G0=[[1, None], [0, 1]])), "must be numbers"),
         (damaged(lambda c: c["speeds"].__setitem__(0, -1.0)), "speeds must be positive and finite, got -1"),
         (
             damaged(lambda c: c["association"]["weights"][0].__setitem__(0, -3.0)),
@@ -164,7 +164,7 @@ def damaged(change):
         ),
         (lambda content: "[" * 100_000, "not a task"),
         (damaged(lambda c: c["association"]["weights"].pop()), r"weights must have shape \(\d, 8\), got"),
-        (damaged(lambda c: c.update(start=[None, 1.0])), "finite"),
+        (damaged(lambda c: c.update(start=[None, 1.0])), "must be numbers"),
     ],
 )
 def test_a_damaged_file_is_a_format_error(task, tmp_path, damage, message):
@@ -377,9 +377,8 @@ def test_a_demonstration_that_cannot_be_matched_is_set_aside(method):
     ("matchings", "message"),
     [
         ([None], "one for each of 2 demonstrations, got 1"),
-        ([None, "mine"], "must be a Matching, .* got 'mine'"),
+        ([None, "mine"], "must be a Matching, got 'mine'"),
         ([None, Matching.identity(3)], "must go from the 8 corners of demonstration 1 .* got 12 indices"),
-        ([None, Matching(np.array([0, 1, 2, 3] * 2), 0.0, 1.0, True)], "must not send two corners to one"),
     ],
 )
 def test_matchings_that_do_not_belong_are_refused(matchings, message):

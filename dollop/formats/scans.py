@@ -43,8 +43,8 @@ narrow."""
 MAX_BEAMS, MAX_READINGS = 36_000, 100_000_000
 """Beams of a scan, a hundredth of a degree apart all round, and readings of a log: ten hours of ten scans of
 271 beams a second, for which a gigabyte is needed."""
-FULL_TURN = 2 * np.pi * 1.01
-"""rad that beams may spread over: files write the angle between them to a few digits."""
+FULL_TURN = 2 * np.pi + 1e-6
+"""rad that beams may spread over, and what rounding adds."""
 
 
 class Beams(NamedTuple):

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_number, checked_numbers, checked_positions, put_in
+from dollop.checks import check_choice, check_positive, checked_array, checked_number, checked_positions, put_in
 from dollop.lab.outlines import Outline, crosses_itself, gaps, inside, outline_distances, wall_distances
 
 __all__ = ["GREY", "LABORATORY", "OAK", "Part", "Room", "STEEL", "WALL_THICKNESS", "WHITE", "panel", "walls"]
@@ -54,7 +54,7 @@ class Part:
     def __post_init__(self):
         check_choice("shape", self.shape, ("box", "cylinder"))
         for name in ("centre", "size", "colour"):
-            object.__setattr__(self, name, tuple(checked_numbers(name, getattr(self, name), 3).tolist()))
+            object.__setattr__(self, name, tuple(checked_array(name, getattr(self, name), 3).tolist()))
         check_positive("size", min(self.size))
         if self.shape == "cylinder" and self.size[0] != self.size[1]:
             raise ValueError(f"a cylinder must be as deep as wide, got {self.size[:2]}")
@@ -115,7 +115,7 @@ class Room:
     height: float = 2.4
 
     def __post_init__(self):
-        corners = checked_numbers("the corners of a room", self.corners, "N", 2)
+        corners = checked_array("the corners of a room", self.corners, "N", 2)
         corners = checked_positions("the corners of a room", corners)
         if len(corners) < 3:
             raise ValueError(f"a room needs three corners or more, got {len(corners)}")

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from dollop.checks import checked_numbers, put_in, told
+from dollop.checks import checked_array, put_in, told
 from dollop.formats.files import check_fields, from_file, read_json
 from dollop.formats.writing import whole_file
 from dollop.lab.outlines import Outline, gaps
@@ -147,7 +147,7 @@ class Scene:
         ValueError
             If an object does not stand free there.
         """
-        places = checked_numbers("positions", positions, len(self.objects), 2)
+        places = checked_array("positions", positions, len(self.objects), 2)
         return replace(self, objects=tuple(map(Object.at, self.objects, places)))
 
     def save(self, path):

@@ -10,8 +10,8 @@ import numpy as np
 from dollop.checks import (
     check_choice,
     check_positive,
+    checked_array,
     checked_number,
-    checked_numbers,
     checked_positions,
     put_in,
     told,
@@ -82,7 +82,7 @@ class Object:
     def __post_init__(self):
         check_choice("shape", self.shape, SHAPES)
         for name in ("position", "size"):
-            object.__setattr__(self, name, tuple(checked_numbers(name, getattr(self, name), 2).tolist()))
+            object.__setattr__(self, name, tuple(checked_array(name, getattr(self, name), 2).tolist()))
         check_positive("size", min(self.size))
         numbers = {
             "height": (1e-3, FARTHEST),
@@ -214,7 +214,7 @@ class Robot:
     radius: float = 0.25
 
     def __post_init__(self):
-        object.__setattr__(self, "pose", tuple(checked_numbers("the robot's pose", self.pose, 3).tolist()))
+        object.__setattr__(self, "pose", tuple(checked_array("the robot's pose", self.pose, 3).tolist()))
         object.__setattr__(self, "way", as_places("the robot's way", self.way))
         put_in(self, speed=checked_number("the robot's speed", self.speed, 0.01, 2))
         put_in(self, radius=checked_number("the robot's radius", self.radius, 0.05, 2))
@@ -282,7 +282,7 @@ class Person:
 
     def __post_init__(self):
         object.__setattr__(self, "places", as_places("a person's places", self.places))
-        object.__setattr__(self, "times", tuple(checked_numbers("times", self.times, "K").tolist()))
+        object.__setattr__(self, "times", tuple(checked_array("times", self.times, "K").tolist()))
         if not self.places:
             raise ValueError("a person needs a place to be, got none")
         check_choice("body", self.body, BODIES)
@@ -343,7 +343,7 @@ class Move:
     seconds: float = 1.0
 
     def __post_init__(self):
-        object.__setattr__(self, "to", tuple(checked_numbers("to", self.to, 2).tolist()))
+        object.__setattr__(self, "to", tuple(checked_array("to", self.to, 2).tolist()))
         put_in(self, begin=checked_number("begin", self.begin, 0, LONGEST))
         put_in(self, seconds=checked_number("seconds", self.seconds, 0.01, LONGEST))
 
@@ -368,4 +368,4 @@ def as_places(name, values):
     """Places (K, 2) as a tuple of tuples."""
     if isinstance(values, tuple | list) and not values:
         return ()
-    return tuple(map(tuple, checked_positions(name, checked_numbers(name, values, "N", 2)).tolist()))
+    return tuple(map(tuple, checked_positions(name, checked_array(name, values, "N", 2)).tolist()))

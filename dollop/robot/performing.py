@@ -26,6 +26,8 @@ __all__ = ["Run", "Unicycle", "perform"]
 SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
 """A robot that does not know where it is turns on the spot, in rad/s, and moves off what it
 touches, in m/s: back, and if that has not helped within so many s, forth."""
+MOST_PERIODS = 500_000
+"""Control periods after which any run is given up: fourteen hours, ten times a second."""
 HELD = 1.0
 """Time in s for which a robot goes on to move off what it touched."""
 
@@ -189,7 +191,7 @@ def perform(
     kidnap : sequence of (float, (3,) sequence)
         At which times in s the robot is put at which poses.
     timeout : float
-        Give up after this time in s.
+        Give up after this time in s, and in any case after 500,000 control periods.
     localise_within : float
         Give up when the robot has not known where it is for this time in s. Until it knows, it
         turns on the spot, and moves off what it touches.
@@ -231,11 +233,12 @@ def perform(
     keeper = WayKeeper(laws, shown, robot, control, chart, avoid)
     check_some_way(subgoals, keeper.known)
     check_free(places, keeper.known)
-    records, reason = drive(keeper, robot, list(kidnap), timeout, localise_within)
+    clearance = Clearance()
+    records, reason = drive(keeper, robot, list(kidnap), timeout, localise_within, clearance)
     robot.drive(0.0, 0.0)
     t = np.arange(len(records)) * robot.period
     kidnapped = [time for time, _ in kidnap if time < len(records) * robot.period]
-    return as_run(t, records, reason, kidnapped)
+    return as_run(t, records, clearance.all(), reason, kidnapped)
 
 
 def ways_of(task, only=False):
@@ -274,10 +277,31 @@ class Search:
         return self.speed, 0.0
 
 
-def drive(keeper, robot, kidnap, timeout, localise_within):
+class Clearance:
+    """Distances in m from the robot's edge, place by place, each on the map of its period, which is not kept."""
+
+    def __init__(self):
+        self.known, self.places, self.told = None, [], []
+
+    def add(self, x, y, known):
+        """One more place in m, on a map."""
+        if known is not self.known and self.places:
+            self.all()
+        self.known = known
+        self.places.append((x, y))
+
+    def all(self):
+        """(N,) float array: of all places so far."""
+        if self.places:
+            self.told.append(self.known.edges(self.places))
+            self.places = []
+        return np.concatenate(self.told)
+
+
+def drive(keeper, robot, kidnap, timeout, localise_within, clearance):
     """The control loop: what was the case in each period, and why it gave up, or nothing.
 
-    A record is (pose, true pose, segment, way, localised, touching, map).
+    A record is (pose, true pose, segment, way, localised, touching).
     """
     records, blind, search = [], 0.0, Search(robot.period)
     while True:
@@ -290,8 +314,9 @@ def drive(keeper, robot, kidnap, timeout, localise_within):
         finite = isfinite(x + y + theta)
         if robot.localised and finite:
             keeper.begin(x, y)
-        state = keeper.active, keeper.way, robot.localised, touching, keeper.known
+        state = keeper.active, keeper.way, robot.localised, touching
         records.append((pose, true_pose, *state))
+        clearance.add(*true_pose[:2], keeper.known)
         if not finite:
             return records, f"the pose must be finite, got {x, y, theta} at {now:.1f} s"
         if robot.localised:
@@ -306,28 +331,19 @@ def drive(keeper, robot, kidnap, timeout, localise_within):
             return records, f"the robot has not known where it is for {localise_within:g} s"
         if now >= timeout:
             return records, f"not finished within {timeout:g} s"
+        if len(records) > MOST_PERIODS:
+            return records, f"not finished within {MOST_PERIODS} periods of {robot.period:g} s"
         robot.drive(*command)
 
 
-def as_run(t, records, reason, kidnapped):
-    """The records of the control loop at times (N,) in s as a Run."""
-    *columns, maps = zip(*records, strict=True)
-    *poses, active, way, localised, touching = map(np.array, columns)
+def as_run(t, records, clearance, reason, kidnapped):
+    """The records of the control loop at times (N,) in s, with clearances (N,) in m, as a Run."""
+    *poses, active, way, localised, touching = map(np.array, zip(*records, strict=True))
     poses, true_poses = (each.astype(float) for each in poses)
-    clearance = clearances(true_poses[:, :2], maps)
     contact = clearance < 0 if touching[0] is None else touching.astype(bool)
     collisions = int(np.count_nonzero(np.diff(contact, prepend=False) & contact))
     told = t, poses, true_poses, active, localised, clearance
     return Run(*told, not reason, reason, collisions, np.array(kidnapped, dtype=float), way)
-
-
-def clearances(places, maps):
-    """Distances (N,) in m from the robot's edge at places (N, 2), each on the map of its period."""
-    clearance, of_map = np.empty(len(places)), {id(each): each for each in maps}
-    used = np.array(list(map(id, maps)))
-    for name, obstacles in of_map.items():
-        clearance[used == name] = obstacles.edges(places[used == name])
-    return clearance
 
 
 def named_subgoals(law):

@@ -161,7 +161,7 @@ def test_plain_pgm(tmp_path):
         ("image: floor.pgm\nresolution: 0.05\n", PGM, "origin must be .x, y, 0. .*, got None"),
         (MAP_SERVER.replace("0.050000", "fine"), PGM, "resolution must be a number, got 'fine'"),
         (MAP_SERVER.replace("0.050000", "yes"), PGM, "resolution must be a number, got 'yes'"),
-        (MAP_SERVER.replace("0.050000", "-1"), PGM, "resolution must be positive .*, got -1"),
+        (MAP_SERVER.replace("0.050000", "-1"), PGM, "resolution must be .*, got -1"),
         (MAP_SERVER.replace("0.000000", "0.3"), PGM, r"a turned map is not supported"),
         (MAP_SERVER.replace("5.5, ", ""), PGM, r"origin must be \[x, y, 0\]"),
         (MAP_SERVER.replace("5.5", "nan"), PGM, "origin must be"),
