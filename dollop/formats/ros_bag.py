@@ -1,13 +1,12 @@
 """Laser scans, odometry and maps from ROS 1 and ROS 2 bags, through rosbags (the extra `ros`)."""
 
-import bz2
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from dollop.checks import checked_array, need
+from dollop.formats.bag_bounds import bound_chunks, check_bag
 from dollop.formats.files import FormatError, check_cells, from_file
 from dollop.formats.odometry import Odometry
 from dollop.formats.ros_frames import Link, laser_poses, planar
@@ -35,8 +34,6 @@ SCAN, ODOMETRY, GRID = (
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 USUAL = {SCAN: None, ODOMETRY: "odom", GRID: "map"}
 """Which topic of a type is meant if there are several and none is named."""
-MAX_CHUNK = 1 << 26
-"""Bytes that a chunk of a ROS 1 bag may unpack to: rosbag writes 768 KiB, and bzip2 packs a gigabyte into one."""
 
 
 def is_bag(path):
@@ -86,7 +83,7 @@ def read_log(path, topic=None):
     FormatError
         If the file is no bag, holds no such topic or several to choose from, more than a few scans
         are broken, or one has beams or ranges that no laser has; or if there are more than 100
-        million readings, or a chunk of a ROS 1 bag unpacks to more than 64 MiB.
+        million readings, or what `dollop.formats.bag_bounds` refuses.
 
     Warns
     -----
@@ -185,6 +182,9 @@ def read_map(path, topic=None):
         raise FormatError("the topic holds no map", path)
     frame = grids[-1].info
     from_file(path, check_cells, frame.width, frame.height)
+    if len(grids[-1].data) != frame.width * frame.height:
+        rule = f"a map of {frame.width} x {frame.height} cells must hold as many"
+        raise FormatError(f"{rule}, got {len(grids[-1].data)}", path)
     percent = np.array(grids[-1].data, float).reshape(frame.height, frame.width)
     x, y, turn, _ = planar(frame.origin.position, frame.origin.orientation)
     if not abs(turn) <= 1e-6:
@@ -196,40 +196,18 @@ def read_map(path, topic=None):
 def _opened(path):
     """The bag, open; whatever rosbags' parsers happen to raise is the file's fault."""
     need("ros")
+    check_bag(path)
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
     try:
         with AnyReader([Path(path)], default_typestore=get_typestore(Stores.LATEST)) as bag:
-            _bound(bag.readers)
+            bound_chunks(bag.readers)
             yield bag
     except FormatError:
         raise
     except Exception as error:
         raise FormatError(f"not a readable ROS bag ({str(error) or type(error).__name__})", path) from None
-
-
-def _bound(readers):
-    """Let no chunk of a ROS 1 bag unpack to more than there is room for."""
-    for reader in readers:
-        chunks = getattr(reader, "chunks", {})
-        for place, chunk in chunks.items():
-            if hasattr(chunk, "decompressor"):
-                chunks[place] = chunk._replace(decompressor=partial(_unpacked, whole=chunk.decompressor))
-
-
-def _unpacked(packed, whole):
-    """A chunk of a ROS 1 bag, as long as it is no longer than `MAX_CHUNK`; `whole` is what rosbags unpacks with."""
-    import lz4.frame
-
-    bounded = {
-        bz2.decompress: bz2.BZ2Decompressor,
-        lz4.frame.decompress: lz4.frame.LZ4FrameDecompressor,
-    }
-    content = bounded[whole]().decompress(packed, MAX_CHUNK + 1) if whole in bounded else whole(packed)
-    if len(content) > MAX_CHUNK:
-        raise ValueError(f"a chunk unpacks to more than {MAX_CHUNK} bytes, the most that is read")
-    return content
 
 
 def _messages(path, bag, kind, topic):

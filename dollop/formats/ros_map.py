@@ -19,7 +19,7 @@ from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, check_cells, from_file, read_bytes, written_number
 from dollop.formats.writing import whole_file
 
-__all__ = ["read_map", "write_map"]
+__all__ = ["plain_nodes", "read_map", "write_map"]
 
 UNKNOWN_GREY = (127, 128)
 """Written maps have thresholds that make these two greys, and no other, the unknown."""
@@ -135,7 +135,7 @@ def _read_keys(path):
 
 
 def _keys_of(content):
-    found, nodes = {}, _nodes(content)
+    found, nodes = {}, plain_nodes(content, MAX_NODES)
     if not isinstance(next(nodes, None), yaml.MappingStartEvent):
         raise ValueError(f"expected 'key: value' in each line, got {told(content[:60])}")
     for key in nodes:
@@ -150,18 +150,35 @@ def _keys_of(content):
     return found
 
 
-def _nodes(content):
-    """The events of a YAML that make its nodes, as they come: no more than there may be."""
+def plain_nodes(content, most):
+    """The events of a YAML that make its nodes, as they come; no object is made of them.
+
+    Parameters
+    ----------
+    content : bytes
+    most : int
+        Nodes.
+
+    Yields
+    ------
+    yaml.Event
+        Where a scalar, a sequence or a mapping begins, or one of these ends.
+
+    Raises
+    ------
+    ValueError
+        For what is no YAML, has an anchor, an alias or a tag, or more nodes.
+    """
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     count = 0
     try:
         for event in yaml.parse(content, loader):
             count += isinstance(event, yaml.NodeEvent)
-            if count > MAX_NODES:
-                raise ValueError(f"holds more than {MAX_NODES} nodes, the most that is read")
+            if count > most:
+                raise ValueError(f"holds more than {most} nodes, the most that is read")
             if getattr(event, "anchor", None) or getattr(event, "tag", None):
                 line = event.start_mark.line + 1
-                raise ValueError(f"a map has no anchors, aliases and tags, got one on line {line}")
+                raise ValueError(f"there must be no anchors, aliases and tags, got one on line {line}")
             if isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent):
                 yield event
     except yaml.YAMLError as error:
