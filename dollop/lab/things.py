@@ -82,7 +82,8 @@ class Object:
     def __post_init__(self):
         check_choice("shape", self.shape, SHAPES)
         for name in ("position", "size"):
-            object.__setattr__(self, name, tuple(checked_array(name, getattr(self, name), 2).tolist()))
+            values = checked_array(name, getattr(self, name), 2, least=-FARTHEST, most=FARTHEST)
+            object.__setattr__(self, name, tuple(values.tolist()))
         check_positive("size", min(self.size))
         numbers = {
             "height": (1e-3, FARTHEST),
@@ -214,7 +215,7 @@ class Robot:
     radius: float = 0.25
 
     def __post_init__(self):
-        object.__setattr__(self, "pose", tuple(checked_array("the robot's pose", self.pose, 3).tolist()))
+        object.__setattr__(self, "pose", as_pose("the robot's pose", self.pose))
         object.__setattr__(self, "way", as_places("the robot's way", self.way))
         put_in(self, speed=checked_number("the robot's speed", self.speed, 0.01, 2))
         put_in(self, radius=checked_number("the robot's radius", self.radius, 0.05, 2))
@@ -343,7 +344,8 @@ class Move:
     seconds: float = 1.0
 
     def __post_init__(self):
-        object.__setattr__(self, "to", tuple(checked_array("to", self.to, 2).tolist()))
+        to = checked_array("to", self.to, 2, least=-FARTHEST, most=FARTHEST)
+        object.__setattr__(self, "to", tuple(to.tolist()))
         put_in(self, begin=checked_number("begin", self.begin, 0, LONGEST))
         put_in(self, seconds=checked_number("seconds", self.seconds, 0.01, LONGEST))
 
@@ -362,6 +364,11 @@ def whole(name, value, least, most):
     if value != int(value):
         raise ValueError(f"{name} must be a whole number, {least} to {most}, got {told(value)}")
     return int(value)
+
+
+def as_pose(name, values):
+    """A pose (3,) as a tuple."""
+    return tuple(checked_array(name, values, 3, least=-FARTHEST, most=FARTHEST).tolist())
 
 
 def as_places(name, values):

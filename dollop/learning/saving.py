@@ -269,10 +269,11 @@ def _way_from(content, count):
 
 def _walks_from(content):
     """Walks that are as long as somebody shows something."""
-    for k, walk in enumerate(_all("walks", content, np.size)):
-        if walk > 2 * MAX_SAMPLES:
-            raise ValueError(f"a walk must have at most {MAX_SAMPLES} samples, got {walk // 2} in walk {k}")
-    return check_trajectories(content)
+    walks = _all("walks", content, lambda each: checked_positions("a walk", each, "N", 2))
+    longest = max(map(len, walks), default=0)
+    if longest > MAX_SAMPLES:
+        raise ValueError(f"a walk must have at most {MAX_SAMPLES} samples, got {longest}")
+    return check_trajectories(walks)
 
 
 def _shares_from(content, walks):
@@ -333,8 +334,8 @@ def _seen_from(content):
     rows = content["floor"]
     if not (isinstance(rows, list) and rows and all(isinstance(row, str) and not row.strip("01") for row in rows)):
         raise ValueError(f"the floor must be rows of 0 and 1, got {told(rows)}")
-    if len(set(map(len, rows))) > 1:
-        raise ValueError("the rows of what was seen must be of one length")
+    if len(set(map(len, rows))) > 1 or not rows[0]:
+        raise ValueError("the rows of what was seen must be of one length, and not empty")
     check_cells(len(rows[0]), len(rows))
     floor = np.frombuffer("".join(rows).encode(), np.uint8).reshape(len(rows), -1) == ord("1")
     return Seen(floor, content["origin"], content["resolution"])
