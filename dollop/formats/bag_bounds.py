@@ -5,19 +5,19 @@ rosbags believes what a bag says of its own lengths, and unpacks whatever a chun
 
 import bz2
 import struct
+from collections import deque
 from functools import partial
-from itertools import accumulate
 from pathlib import Path
 
-from dollop.formats.files import FormatError, read_bytes
+from dollop.formats.files import FormatError, from_file, read_bytes
 from dollop.formats.ros_map import plain_nodes
 
 __all__ = ["MAX_CHUNK", "bound_chunks", "check_bag"]
 
 MAX_CHUNK = 1 << 26
 """Bytes that a chunk may unpack to: rosbag writes 768 KiB, ROS 2 4 MiB, and bzip2 packs a gigabyte into one."""
-MAX_METADATA, MAX_NODES, DEEPEST = 1 << 17, 10_000, 20
-"""Bytes, nodes and brackets within each other of a bag's metadata.yaml: a hundred topics with their settings."""
+MAX_METADATA, MAX_NODES = 1 << 17, 10_000
+"""Bytes and nodes of a bag's metadata.yaml: a hundred topics with their settings."""
 BAG, MCAP = b"#ROSBAG V2.0\n", b"\x89MCAP0\r\n"
 CHUNK = 6
 """What a record of an mcap file begins with that is a chunk."""
@@ -83,15 +83,7 @@ def _unpacked(kind, packed):
 
 
 def _check_metadata(path):
-    content = read_bytes(path, MAX_METADATA)
-    brackets = (1 if byte in b"[{" else -1 for byte in content if byte in b"[{]}")
-    if max(accumulate(brackets), default=0) > DEEPEST:
-        raise FormatError(f"brackets must be at most {DEEPEST} deep within each other", path)
-    try:
-        for _ in plain_nodes(content, MAX_NODES):
-            pass
-    except ValueError as error:
-        raise FormatError(str(error), path) from None
+    from_file(path, deque, plain_nodes(read_bytes(path, MAX_METADATA), MAX_NODES), 0)
 
 
 def _check_records(path, stream, size):

@@ -9,6 +9,7 @@ import os
 import re
 import struct
 import warnings
+from itertools import accumulate
 
 import numpy as np
 import yaml
@@ -46,6 +47,9 @@ NEGATE = {
 
 MAX_YAML, MAX_NODES = 1 << 16, 1000
 """Bytes and nodes of the YAML, which holds seven keys, and perhaps others that are passed over."""
+
+DEEPEST = 20
+"""Brackets of a YAML within each other: of thousands PyYAML tries for minutes whether each begins a key."""
 
 MAX_PICTURE, MAX_HEAD = 1 << 27, 1 << 12
 """Bytes of the picture, and of a PGM's head up to its size: the most cells in text, and some comments."""
@@ -167,8 +171,12 @@ def plain_nodes(content, most):
     Raises
     ------
     ValueError
-        For what is no YAML, has an anchor, an alias or a tag, or more nodes.
+        For what is no YAML, has an anchor, an alias or a tag, brackets more than 20 deep within each
+        other, or more nodes.
     """
+    brackets = (1 if byte in b"[{" else -1 for byte in content if byte in b"[{]}")
+    if max(accumulate(brackets), default=0) > DEEPEST:
+        raise ValueError(f"brackets must be at most {DEEPEST} deep within each other")
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     count = 0
     try:
