@@ -21,7 +21,7 @@ from dollop.checks import (
 )
 from dollop.formats import carmen_map, ros_bag
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.formats.files import FormatError, from_file
+from dollop.formats.files import FormatError, check_cells, from_file
 from dollop.formats.writing import checked_path
 from dollop.laser import LaserLog
 
@@ -30,7 +30,10 @@ __all__ = [
     "map_inputs", "map_outputs",
 ]  # fmt: skip
 
-MAX_CELLS = 100_000_000
+FINEST = 1e-3
+"""m: no laser tells more, and a beam passes so many cells."""
+READINGS, POINTS = 100_000, 1_000_000
+"""Beams, and cells along them, that are counted at once: some 100 MB."""
 MOST_ALONG = 1_000_000
 SIDES = 1e-6, 1e3
 """m: cells of a map are neither smaller nor larger."""
@@ -118,8 +121,8 @@ class OccupancyGrid:
         Raises
         ------
         ValueError
-            If the grid would have more than 100 million cells, or a parameter is not positive and
-            finite.
+            If the grid would have more than 25 million cells or not lie within 1e9 m of the origin, if
+            `max_range` is no length, or `resolution` is not from 1 mm to 1 km.
 
         Notes
         -----
@@ -139,22 +142,12 @@ class OccupancyGrid:
         True
         """
         checked_record("log", log, LaserLog)
-        resolution = checked_number("resolution", resolution, *SIDES)
+        resolution = checked_number("resolution", resolution, FINEST, SIDES[1])
         max_range = checked_number("max_range", max_range, SIDES[0])
         reach = np.minimum(log.ranges, min(max_range, log.max_range))
-        bearings = log.poses[:, 2, None] + log.angles
-        directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
-        ends = log.poses[:, None, :2] + reach[..., None] * directions
-        frame = _frame(np.vstack([*ends, log.poses[:, :2]]), resolution)
-        is_hit = log.ranges <= max_range
-        # A cell's diagonal before its hit a beam has left no trace yet in the cell that it hits.
-        steps = (reach / resolution - np.sqrt(2) * is_hit).astype(int).clip(0)
-        some = np.array_split(np.arange(len(log)), 1 + steps.size // 10_000)
-        passed = (_passed(log, scans, directions, steps, resolution) for scans in some)
-        passes = sum(_counts(points, *frame) for points in passed)
-        hits = _counts(ends[is_hit], *frame)
-        seen = hits + passes
-        return cls(np.divide(hits, seen, out=np.full(seen.shape, np.nan), where=seen > 0), *frame[:2])
+        some = np.array_split(np.arange(len(log)), min(len(log), 1 + reach.size // READINGS))
+        frame = _frame(np.vstack([_bounds(log, scans, reach) for scans in some]), resolution)
+        return cls(_occupancy(log, some, reach, log.ranges <= max_range, *frame), *frame[:2])
 
     @classmethod
     def load(cls, path):
@@ -470,14 +463,55 @@ def _format_of(path):
     return ros_map
 
 
+def _rays(log, scans, reach):
+    """Beams of some scans: where they begin, their directions and where they end, (N, 2) each."""
+    bearings = log.poses[scans, 2, None] + log.angles
+    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+    begins = np.broadcast_to(log.poses[scans, None, :2], directions.shape)
+    ends = begins + reach[scans, :, None] * directions
+    return tuple(each.reshape(-1, 2) for each in (begins, directions, ends))
+
+
+def _bounds(log, scans, reach):
+    """Corners (2, 2) of the box round all beams of some scans."""
+    begins, _, ends = _rays(log, scans, reach)
+    both = np.vstack([ends, begins])
+    return np.array([both.min(axis=0), both.max(axis=0)])
+
+
 def _frame(points, resolution):
     """Corner, resolution and shape of a grid that holds the points (M, 2), with a cell to spare."""
+    farthest = np.abs(points).max()
+    if not farthest <= FARTHEST:
+        raise ValueError(f"a map must lie within {FARTHEST:g} m of the origin, got {farthest:g} m")
     left, low = np.floor(points.min(axis=0) / resolution) - 1
     right, high = np.floor(points.max(axis=0) / resolution) + 2
     columns, rows = right - left, high - low
-    if not columns * rows <= MAX_CELLS:
-        raise ValueError(f"{columns} x {rows} cells of {resolution} m are more than {MAX_CELLS}")
+    check_cells(columns, rows)
     return (left * resolution, low * resolution), resolution, (int(rows), int(columns))
+
+
+def _occupancy(log, some, reach, is_hit, origin, resolution, shape):
+    """Hits by hits and passes (H, W), NaN where there is neither, counted in some scans after others."""
+    hits, passes = (np.zeros(shape, dtype=int) for _ in range(2))
+    for scans in some:
+        begins, directions, ends = _rays(log, scans, reach)
+        hits += _counts(ends[is_hit[scans].ravel()], origin, resolution, shape)
+        # A cell's diagonal before its hit a beam has left no trace yet in the cell that it hits.
+        steps = (reach[scans] / resolution - np.sqrt(2) * is_hit[scans]).astype(int).clip(0).ravel()
+        # A laser that stands still must not step over the same corners in every scan: the golden
+        # ratio spreads the phases.
+        phases = np.repeat(scans * ((np.sqrt(5) - 1) / 2) % 1, reach.shape[1])
+        for few in np.split(np.arange(len(steps)), _cuts(steps)):
+            points = _passed(begins[few], directions[few], steps[few], phases[few], resolution)
+            passes += _counts(points, origin, resolution, shape)
+    passes += hits
+    return np.divide(hits, passes, out=np.full(shape, np.nan), where=passes > 0)
+
+
+def _cuts(steps):
+    """Where to cut beams of so many steps (N,) into parts, so that none has many more than `POINTS` in all."""
+    return 1 + np.flatnonzero(np.diff(np.cumsum(steps) // POINTS))
 
 
 def _counts(points, origin, resolution, shape):
@@ -486,15 +520,11 @@ def _counts(points, origin, resolution, shape):
     return np.bincount(cells, minlength=shape[0] * shape[1]).reshape(shape)
 
 
-def _passed(log, scans, directions, steps, resolution):
-    """Points a cell apart along the beams of some scans, as many as there are `steps` (T, B)."""
-    steps = steps[scans]
-    along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps.ravel(), steps.ravel())
-    # A laser that stands still must not step over the same corners in every scan: the golden ratio
-    # spreads the phases.
-    along = along + np.repeat(scans * ((np.sqrt(5) - 1) / 2) % 1, steps.sum(axis=1))
-    starts = np.repeat(log.poses[scans, :2], steps.sum(axis=1), axis=0)
-    ways = np.repeat(directions[scans].reshape(-1, 2), steps.ravel(), axis=0)
+def _passed(begins, directions, steps, phases, resolution):
+    """Points a cell apart along beams (N, 2), as many as there are `steps` (N,), the first by phases of a cell."""
+    along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
+    along = along + np.repeat(phases, steps)
+    starts, ways = np.repeat(begins, steps, axis=0), np.repeat(directions, steps, axis=0)
     return starts + ways * (along * resolution)[:, None]
 
 

@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -97,8 +98,9 @@ def test_beams_without_return_clear_up_to_the_maximum_range():
 
 def test_oversized_grid_is_refused():
     """A pose so far astray that it asks for billions of cells is an error; it tells the size."""
-    with pytest.raises(ValueError, match="are more than 100000000"):
-        OccupancyGrid.from_log(room_log([(0, 0, 0), (1, 1, 0)]), resolution=1e-5)
+    log = replace(room_log([(0, 0, 0), (1, 1, 0)]), poses=[(0, 0, 0), (400, 400, 0)])
+    with pytest.raises(ValueError, match=r"^80\d\d x 80\d\d cells are more than 25000000"):
+        OccupancyGrid.from_log(log)
 
 
 @pytest.mark.parametrize("name", ["resolution", "max_range"])
