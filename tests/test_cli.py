@@ -44,7 +44,7 @@ def test_map_and_observe_write_what_they_say(tmp_path, capsys):
         (["observe", str(DATA / "empty_lab.log.gz"), "a.map", "--topic", "/scan"], "no topics, got topic='/scan'"),
         (["map", str(DATA / "empty_lab.log.gz"), "a.map", "--fov", "180"], "state their field of view, got fov=3.14"),
         (["observe", str(DATA / "empty_lab.log.gz"), "a.map", "--fov", "360"], "state their field of view, got fov="),
-        (["map", str(DATA / "empty_lab.log.gz"), "a.map", "--resolution", "nan"], "resolution must be positive"),
+        (["map", str(DATA / "empty_lab.log.gz"), "a.map", "--resolution", "nan"], "resolution must be a finite number"),
         (["observe", str(DATA / "moved_cans_0.log.gz"), LAB, "--min-area", "nan"], "got nan"),
         (["observe", str(DATA / "moved_cans_0.log.gz"), LAB], "nobody walks in"),
         (["observe", EIGHTS, LAB, "--user", "8.5,1.5"], "when first seen: 0 at ("),

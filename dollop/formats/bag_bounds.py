@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 
 from dollop.formats.files import FormatError, from_file, read_bytes
-from dollop.formats.ros_map import plain_nodes
 
 __all__ = ["MAX_CHUNK", "bound_chunks", "check_bag"]
 
@@ -83,6 +82,8 @@ def _unpacked(kind, packed):
 
 
 def _check_metadata(path):
+    from dollop.formats.plain_yaml import plain_nodes
+
     from_file(path, deque, plain_nodes(read_bytes(path, MAX_METADATA), MAX_NODES), 0)
 
 

@@ -11,7 +11,6 @@ import re
 import struct
 import warnings
 from contextlib import suppress
-from itertools import accumulate
 
 import numpy as np
 import yaml
@@ -21,9 +20,10 @@ from dollop.checks import check_choice, told
 from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, check_cells, from_file, read_bytes, written_number
 from dollop.formats.kinds import PGM, ROS_MAP
+from dollop.formats.plain_yaml import plain_nodes
 from dollop.formats.writing import Output, together, whole_file
 
-__all__ = ["outputs", "picture_of", "plain_nodes", "read_map", "write_map"]
+__all__ = ["outputs", "picture_of", "read_map", "write_map"]
 
 UNKNOWN_GREY = (127, 128)
 """Written maps have thresholds that make these two greys, and no other, the unknown."""
@@ -50,9 +50,6 @@ NEGATE = {
 
 MAX_YAML, MAX_NODES = 1 << 16, 1000
 """Bytes and nodes of the YAML, which holds seven keys, and perhaps others that are passed over."""
-
-DEEPEST = 20
-"""Brackets of a YAML within each other: of thousands PyYAML tries for minutes whether each begins a key."""
 
 MAX_PICTURE, MAX_HEAD = 1 << 27, 1 << 12
 """Bytes of the picture, and of a PGM's head up to its size: the most cells in text, and some comments."""
@@ -195,45 +192,6 @@ def _keys_of(content):
     if any(isinstance(event, yaml.NodeEvent) for event in nodes):
         raise ValueError("expected one document, got another after it")
     return found
-
-
-def plain_nodes(content, most):
-    """The events of a YAML that make its nodes, as they come; no object is made of them.
-
-    Parameters
-    ----------
-    content : bytes
-    most : int
-        Nodes.
-
-    Yields
-    ------
-    yaml.Event
-        Where a scalar, a sequence or a mapping begins, or one of these ends.
-
-    Raises
-    ------
-    ValueError
-        For what is no YAML, has an anchor, an alias or a tag, brackets more than 20 deep within each
-        other, or more nodes.
-    """
-    brackets = (1 if byte in b"[{" else -1 for byte in content if byte in b"[{]}")
-    if max(accumulate(brackets), default=0) > DEEPEST:
-        raise ValueError(f"brackets must be at most {DEEPEST} deep within each other")
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-    count = 0
-    try:
-        for event in yaml.parse(content, loader):
-            count += isinstance(event, yaml.NodeEvent)
-            if count > most:
-                raise ValueError(f"holds more than {most} nodes, the most that is read")
-            if getattr(event, "anchor", None) or getattr(event, "tag", None):
-                line = event.start_mark.line + 1
-                raise ValueError(f"there must be no anchors, aliases and tags, got one on line {line}")
-            if isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent):
-                yield event
-    except yaml.YAMLError as error:
-        raise ValueError(f"not YAML: {error}") from None
 
 
 def _value(event, nodes):
