@@ -88,7 +88,8 @@ class Run:
     Raises
     ------
     ValueError
-        Arrays that are not of one length, or of no period at all; what is no number, flag or text.
+        Arrays that are not of one length, or of no period at all; what is no number, flag or text, or
+        is not finite before the last period, in which the robot may have lost its pose.
     """
 
     t: np.ndarray
