@@ -22,18 +22,13 @@ from dollop.checks import (
 from dollop.formats import carmen_map, ros_bag
 from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, from_file
+from dollop.formats.writing import checked_path
 from dollop.laser import LaserLog
 
 __all__ = [
-    "SIDES",
-    "OccupancyGrid",
-    "check_is_map",
-    "covered_cells",
-    "distances_to",
-    "flat_cells",
-    "in_cells",
-    "in_metres",
-]
+    "SIDES", "OccupancyGrid", "check_is_map", "covered_cells", "distances_to", "flat_cells", "in_cells", "in_metres",
+    "map_inputs", "map_outputs",
+]  # fmt: skip
 
 MAX_CELLS = 100_000_000
 MOST_ALONG = 1_000_000
@@ -201,7 +196,7 @@ class OccupancyGrid:
         FormatError
             If the name says neither.
         OSError
-            If it cannot be written.
+            If it cannot be written, or what is there is no such map or the picture of another.
         """
         _format_of(path).write_map(path, self.occupancy, self.origin, self.resolution)
 
@@ -424,8 +419,45 @@ def check_is_map(path):
     FormatError
         If it ends neither in `.yaml` or `.yml` (ROS) nor in `.map` (CARMEN).
     """
-    if Path(path).suffix not in (".map", ".yaml", ".yml"):
+    if checked_path(path).suffix not in (".map", ".yaml", ".yml"):
         raise FormatError("a map is named .yaml (ROS) or .map (CARMEN)", path)
+
+
+def map_outputs(path):
+    """Files that `OccupancyGrid.save` writes.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the map.
+
+    Returns
+    -------
+    list of Output
+
+    Raises
+    ------
+    FormatError
+        If the name is not one of a map.
+    """
+    return _format_of(path).outputs(path)
+
+
+def map_inputs(path):
+    """Files that `OccupancyGrid.load` reads, as far as they are known before.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the map.
+
+    Returns
+    -------
+    list of str or Path
+    """
+    is_ros = Path(path).suffix in (".yaml", ".yml") and not ros_bag.is_bag(path)
+    picture = _format_of(path).picture_of(path) if is_ros else None
+    return [path] if picture is None else [path, picture]
 
 
 def _format_of(path):

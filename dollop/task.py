@@ -21,6 +21,7 @@ from dollop.checks import (
     trusted,
 )
 from dollop.environment import Environment
+from dollop.formats.kinds import TASK
 from dollop.formats.writing import whole_file
 from dollop.laps import cut_laps
 from dollop.learning.anchored import learn_anchored, tied_to_corners, told_of_places
@@ -388,9 +389,9 @@ class Task:
         Raises
         ------
         OSError
-            Where the file cannot be written.
+            Where the file cannot be written, or what is there is not a task.
         """
-        with whole_file(path, "w") as stream:
+        with whole_file(path, "w", TASK) as stream:
             json.dump(as_dict(self), stream, indent=1, default=np.ndarray.tolist)
             stream.write("\n")
 

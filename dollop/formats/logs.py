@@ -5,6 +5,7 @@ from pathlib import Path
 from dollop.checks import checked_record, told
 from dollop.formats import carmen_log, ros_bag
 from dollop.formats.files import FormatError
+from dollop.formats.writing import checked_path
 from dollop.laser import LaserLog
 
 __all__ = ["read_log", "read_odometry", "write_log"]
@@ -112,7 +113,7 @@ def write_log(path, log):
         If the beams are not evenly spaced, or it is no LaserLog.
     """
     checked_record("log", log, LaserLog)
-    _check_is_carmen(Path(path))
+    _check_is_carmen(checked_path(path))
     carmen_log.write_log(path, log)
 
 
