@@ -321,7 +321,7 @@ def test_no_number_is_larger_than_a_float():
     """Wherever in a scene 10**400 is put in place of a number, ValueError tells of it."""
     content = full_scene()
     for path in numbers(content):
-        with pytest.raises(ValueError, match="whole number of some 401|1000000"):
+        with pytest.raises(ValueError, match="whole number of s|1000000"):
             Scene.from_dict(with_part(content, path, 10**400))
 
 
