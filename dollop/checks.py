@@ -1,6 +1,6 @@
 """What is asked of input, and what is said of results: errors and notes name the value and the rule."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from importlib.util import find_spec
 from itertools import chain, islice
@@ -488,7 +488,7 @@ def checked_record(name, value, kind):
 
 
 def checked_records(name, values, kind):
-    """Values as a tuple, if all are records of the kind wanted, and no more than a hundred thousand.
+    """Values in order as a tuple, if all are records of the kind wanted, at most a hundred thousand.
 
     Parameters
     ----------
@@ -513,7 +513,7 @@ def checked_records(name, values, kind):
     ValueError: notes[1] must be a Note, got None
     """
     try:
-        found = tuple(islice(values, _MOST_RECORDS + 1))
+        found = tuple(islice(None if isinstance(values, Mapping | Set) else values, _MOST_RECORDS + 1))
     except TypeError:
         raise ValueError(f"{name} must be several of {kind.__name__}, got {told(values)}") from None
     if len(found) > _MOST_RECORDS:
