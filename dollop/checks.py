@@ -1,9 +1,9 @@
 """What is asked of input, and what is said of results: errors and notes name the value and the rule."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from importlib.util import find_spec
-from itertools import chain
+from itertools import chain, islice
 from reprlib import Repr
 
 import numpy as np
@@ -120,6 +120,7 @@ _REAL = int, float, np.integer, np.floating
 _NO_NUMBER = bool, np.timedelta64  # which Python and numpy count among the whole numbers
 _PLAIN = frozenset([int, float, *(np.dtype(code).type for code in "bBhHiIlLqQefdg")])
 _BUFFERS = str, bytes, bytearray, memoryview, np.ma.MaskedArray
+_MOST_RECORDS = 100_000
 _DEEPEST = 32  # axes: lists deeper than that hold themselves
 
 
@@ -253,6 +254,10 @@ def checked_array(name, values, *shape, finite=True, least=-np.inf, most=np.inf)
     Traceback (most recent call last):
     ValueError: speeds must be numbers in rows of one length, got [0.5, True]
     """
+    if (
+        type(values) is np.ndarray and values.dtype.kind in "iuf"
+    ):  # before it is copied: it may be one number, many times
+        _check_shape(name, values.shape, shape)
     array = _as_floats(name, values)
     _check_shape(name, array.shape, shape)
     bounded = least > -np.inf or most < np.inf
@@ -483,7 +488,7 @@ def checked_record(name, value, kind):
 
 
 def checked_records(name, values, kind):
-    """Values as a tuple, if all are records of the kind wanted.
+    """Values in order as a tuple, if all are records of the kind wanted, at most a hundred thousand.
 
     Parameters
     ----------
@@ -508,9 +513,12 @@ def checked_records(name, values, kind):
     ValueError: notes[1] must be a Note, got None
     """
     try:
-        values = tuple(values)
+        found = tuple(islice(None if isinstance(values, Mapping | Set) else values, _MOST_RECORDS + 1))
     except TypeError:
         raise ValueError(f"{name} must be several of {kind.__name__}, got {told(values)}") from None
+    if len(found) > _MOST_RECORDS:
+        raise ValueError(f"{name} must be at most {_MOST_RECORDS}, got {told(values)}")
+    values = found
     for k, value in enumerate(values):
         checked_record(f"{name}[{k}]", value, kind)
     return values

@@ -144,10 +144,10 @@ class Matching:
         most = float(np.finfo(float).max)
         put_in(
             self,
-            cost=checked_number("cost", self.cost, -most, most),
+            cost=checked_number("cost", self.cost, 1 - _CERTAIN, most),
             turn=checked_number("turn", self.turn),
         )
-        put_in(self, margin=checked_number("margin", self.margin, -most, np.inf))
+        put_in(self, margin=checked_number("margin", self.margin, 1 - _CERTAIN, np.inf))
         self._check_probabilities()
 
     def _check_probabilities(self):

@@ -202,6 +202,7 @@ class Task:
         shown = checked_records("demonstrations", self.demonstrations, Demonstration)
         ways = checked_records("ways", self.ways, SequencedLDS) or (law,)
         objects = np.arange(count) if self.objects is None else self.objects
+        objects = checked_wholes("objects", objects, "N", least=-1, most=count - 1)
         counts = self.shown if np.size(self.shown) else (len(shown),)
         put_in(
             self,
@@ -209,8 +210,8 @@ class Task:
             notes=checked_records("notes", self.notes, Note),
             ways=ways,
             shown=tuple(checked_wholes("shown", counts, len(ways)).tolist()),
-            partners=tuple(map(_partners, checked_records("partners", self.partners, object))),
-            objects=checked_wholes("objects", objects, "N", least=-1, most=count - 1),
+            partners=checked_partners(self.partners, shown, len(objects)),
+            objects=objects,
             learned=checked_records("learned", self.learned, Way),
         )
 
@@ -428,7 +429,7 @@ def _laid_out(known, environment, objects, turn=0.0):
     placed = [way.among(environment, partners, turn) for way in ways]
     laws, kept = zip(*(way.law(now) for way, now in zip(ways, placed, strict=True)), strict=True)
     tied = tied_to_corners(ways[0], placed[0], laws[0], environment, objects)
-    notes = dict.fromkeys((*known["notes"], *told_of_places(ways, kept, partners)))
+    notes = tuple(dict.fromkeys((*known["notes"], *told_of_places(ways, kept, partners))))
     shown = tuple(len(way.members) for way in ways)
     return Task(
         laws[0],
@@ -440,13 +441,25 @@ def _laid_out(known, environment, objects, turn=0.0):
     )
 
 
-def _partners(partners):
-    """The objects (N,) that those of a demonstration are, or None for one that was set aside."""
-    if partners is None:
-        return None
-    partners = checked_wholes("partners", partners, "N", least=-1)
-    partners.flags.writeable = False
-    return partners
+def checked_partners(partners, demonstrations, n):
+    """For each demonstration which of n objects its own are, (N_k,) int array or None, a tuple; or none.
+
+    Raises
+    ------
+    ValueError
+        Another number of demonstrations or of objects, or what is no number of an object.
+    """
+    partners = checked_records("partners", partners, object)
+    if len(partners) not in (0, len(demonstrations)):
+        rule = f"partners must be given for each of {len(demonstrations)} demonstrations"
+        raise ValueError(f"{rule}, got {len(partners)}")
+    found = []
+    for each, shown in zip(partners, demonstrations, strict=False):
+        if each is not None:
+            each = checked_wholes("partners", each, len(shown.environment), least=-1, most=n - 1)
+            each.flags.writeable = False
+        found.append(each)
+    return tuple(found)
 
 
 def layout_turn_of(before, after, matching):

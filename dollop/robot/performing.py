@@ -88,7 +88,8 @@ class Run:
     Raises
     ------
     ValueError
-        Arrays that are not of one length, or of no period at all; what is no number, flag or text.
+        Arrays that are not of one length, or of no period at all; what is no number, flag or text, or
+        is not finite before the last period, in which the robot may have lost its pose.
     """
 
     t: np.ndarray
@@ -107,18 +108,15 @@ class Run:
         t = checked_array("t", self.t, "N")
         if not len(t):
             raise ValueError("a run must have a period, got none")
-        places = {
-            "poses": self.poses,
-            "true_poses": self.true_poses,
-        }  # the last may be why it ended
         way = np.zeros(len(t)) if self.way is None else self.way
         put_in(
             self,
             t=t,
-            **{name: checked_array(name, each, len(t), 3, finite=False) for name, each in places.items()},
+            poses=checked_but_last("poses", self.poses, len(t), 3),
+            true_poses=checked_but_last("true_poses", self.true_poses, len(t), 3),
             active=checked_wholes("active", self.active, len(t)),
             localised=checked_flags("localised", self.localised, len(t)),
-            clearance=checked_array("clearance", self.clearance, len(t), finite=False),
+            clearance=checked_but_last("clearance", self.clearance, len(t)),
             finished=checked_flag("finished", self.finished),
             reason=checked_record("reason", self.reason, str),
             collisions=checked_whole("collisions", self.collisions),
@@ -130,6 +128,13 @@ class Run:
         end = "finished" if self.finished else self.reason
         touched = f"{self.collisions} collisions, least clearance {self.clearance.min():.2f} m"
         return f"Run of {self.t[-1]:.1f} s{told_ways(self)}: {end}; {touched}"
+
+
+def checked_but_last(name, values, *shape):
+    """Values as a float array; ValueError where they are not finite before the last."""
+    array = checked_array(name, values, *shape, finite=False)
+    checked_array(f"{name} before the last", array[:-1], *array[:-1].shape)
+    return array
 
 
 def told_ways(run):
