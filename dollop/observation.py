@@ -542,7 +542,7 @@ def checked_user(user):
     if isinstance(user, str):
         check_choice("user", user, ("fastest",))
         return user
-    if isinstance(user, int | np.integer) and not isinstance(user, bool):
+    if isinstance(user, int | np.integer) and not isinstance(user, bool | np.timedelta64):
         return int(user)
     return checked_positions("user", user, 2)
 

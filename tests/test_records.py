@@ -304,6 +304,11 @@ def test_what_hostile_calls_found_stays_mended():
         dollop.Environment(np.array(1.0))
     with pytest.raises(ValueError, match="candidates must be a whole number, 3 to 400, got 1000"):
         dollop.SequencedLDS.fit(WALK, candidates=1000)
+    with pytest.raises(ValueError, match="user must be numbers"):
+        dollop.Observer(grid, [0.0, 0.1], np.timedelta64(3, "s"))
+    lost = SimpleNamespace(pose=1.0, localised=False, limits=PIONEER_LIMITS, period=0.1, drive=print)
+    with pytest.raises(ValueError, match=r"the robot's pose must have shape \(3,\), got \(\)"):
+        dollop.perform(TASK, lost)
     with pytest.raises(ValueError, match="sequences must be at most 100000"):
         dollop.SubgoalHMM.fit(np.broadcast_to(1.0, (10**9, 2)))
 
