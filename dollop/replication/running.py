@@ -14,7 +14,7 @@ import joblib
 from joblib.externals.loky import ProcessPoolExecutor
 from tqdm import tqdm
 
-from dollop.checks import need
+from dollop.checks import need, shortened
 from dollop.replication.fingerprint import fingerprint
 from dollop.replication.ledger import NOT_DONE
 
@@ -48,9 +48,10 @@ def run_all(ledger, jobs, answers, stamp, work, scheduler=None, workers=-1):
     The jobs of a seed follow each other in one worker, which makes what they share once. A seed that
     another study in the same folder is at is left to that, and done only if it does not get done
     there. When a worker dies, its job is tried again alone, when all others are done, and set aside
-    when it has killed alone twice; one without an end after 600 s is set aside at once. (Dask tries
-    again by itself, and what it gives up is set aside.) What is set aside has a line in the table that
-    says why, and is tried again when the study is.
+    when it has killed alone twice; one without an end after 600 s is set aside at once. A Dask cluster
+    gets a seed whole, tries again by itself, and gets what it gives up job by job; it cannot be made
+    to stop. What is set aside has a line in the table that says why, and is tried again when the study
+    is run again.
 
     Parameters
     ----------
@@ -108,8 +109,13 @@ def _say(text):
     tqdm.write(text, sys.stderr)
 
 
-def _tried(work, job):
-    """What becomes of a job, in the worker: its columns or None, and the reason if there are none."""
+def _tried(work, jobs):
+    """What becomes of jobs, in the worker: their columns or None, and the reason if there are none."""
+    return [_one_tried(work, job) for job in jobs]
+
+
+def _one_tried(work, job):
+    """What becomes of one."""
     try:
         return work(job), ""
     except (Exception, SystemExit) as error:  # whatever it is, the other jobs' results are not lost
@@ -143,7 +149,7 @@ class _Course:
                 self.settle(busy[future])
             for lane in busy.values():
                 if lane.future and lane.late():
-                    self.finish(lane.ended(renew=True), None, f"no end after {LIMIT:g} s")
+                    self.give_up(lane.ended(renew=True), f"no end after {LIMIT:g} s")
 
     def fill(self, lanes):
         """Give every lane that waits its next job; one that has killed a worker only when all others are done."""
@@ -153,8 +159,7 @@ class _Course:
             if not lane.future and lane.jobs:
                 lane.start(self.work)
         if self.again and not any(lane.future for lane in lanes):
-            lanes[0].jobs.append(self.again.popleft())
-            lanes[0].start(self.work)
+            lanes[0].start(self.work, [self.again.popleft()])
 
     def begin_seed(self):
         """The jobs to do of a seed that nobody is at; none if there is no such seed."""
@@ -178,22 +183,31 @@ class _Course:
         error = lane.future.exception()
         if not error:
             self.in_a_row = 0
-            self.finish(lane.job, *lane.future.result())
+            for job, found in zip(lane.under_way, lane.future.result(), strict=True):
+                self.finish(job, *found)
             lane.ended()
             return
         kinds = {kind.__name__ for kind in type(error).__mro__}
-        if "KilledWorker" in kinds:  # of Dask, which has tried again
-            self.finish(lane.ended(), None, f"killed its workers: {error}")
+        if "KilledWorker" in kinds:
+            self.give_up(lane.ended(), "killed its workers, says Dask")
         elif "BrokenProcessPool" in kinds:
-            self.died(lane.ended(renew=True), error)
+            self.died(*lane.ended(renew=True), error)
         else:
             raise error
+
+    def give_up(self, jobs, why):
+        """Set a job aside; of several find out which."""
+        if len(jobs) == 1:
+            self.finish(*jobs, None, why)
+        else:
+            self.again.extend(jobs)
+            _say(f"a worker was lost over seed {jobs[0][-1]}, whose jobs are tried one by one")
 
     def died(self, job, error):
         """Try a job that has killed its worker again, later and alone, or set it aside."""
         self.deaths[job] += 1
         if self.deaths[job] > ALONE:
-            self.finish(job, None, f"killed its worker {self.deaths[job]} times, {ALONE} of them alone")
+            self.finish(job, None, f"killed its worker {self.deaths[job]} times ({ALONE} of them alone)")
             return
         self.again.append(job)
         _say(f"a worker died over {self.name(job)} ({type(error).__name__}), which is tried again alone")
@@ -204,7 +218,7 @@ class _Course:
 
     def finish(self, job, found, why):
         """Add a job's line to the table, with what was found or with the reason why nothing was."""
-        ledger, seed = self.table.ledger, job[-1]
+        ledger, seed, why = self.table.ledger, job[-1], shortened(why)
         row = dict.fromkeys(ledger.columns, "") | self.stamp(job) | (found or {ledger.why: NOT_DONE + why})
         self.table.append(row | dict(zip(ledger.columns, job, strict=False)))
         if found is None:
@@ -230,28 +244,33 @@ class _Lane:
     ----------
     open_, stop, kill : callable
         What makes the worker's executor, what ends that, and what ends it whatever it is at.
+    whole : bool
+        Whether it gets all jobs of a seed at a time.
     """
 
-    def __init__(self, open_, stop, kill):
-        self.open, self.stop, self.kill = open_, stop, kill
-        self.executor, self.future, self.job, self.jobs = None, None, None, deque()
+    def __init__(self, open_, stop, kill, whole=False):
+        self.open, self.stop, self.kill, self.whole = open_, stop, kill, whole
+        self.executor, self.future, self.under_way, self.jobs = None, None, [], []
 
-    def start(self, work):
-        """Begin the next job."""
+    def start(self, work, jobs=None):
+        """Begin some jobs, or else the next."""
+        if jobs is None:
+            n = len(self.jobs) if self.whole else 1
+            jobs, self.jobs = self.jobs[:n], self.jobs[n:]
         self.executor = self.executor or self.open()
-        self.job, self.began = self.jobs.popleft(), time.monotonic()
-        self.future = self.executor.submit(work, self.job)
+        self.under_way, self.began = jobs, time.monotonic()
+        self.future = self.executor.submit(work, jobs)
 
     def late(self):
-        """Whether the job has taken longer than any may."""
-        return time.monotonic() - self.began > LIMIT
+        """Whether the jobs have taken longer than any may."""
+        return time.monotonic() - self.began > LIMIT * len(self.under_way)
 
     def ended(self, renew=False):
-        """The job, which is no longer under way."""
+        """The jobs, which are no longer under way."""
         self.future = None
         if renew:
             self.close(self.kill)
-        return self.job
+        return self.under_way
 
     def close(self, how=None):
         """End the worker, if there is one."""
@@ -303,7 +322,7 @@ def _end_with(parent):
 
 
 def _on_cluster(scheduler, stack):
-    """A lane for each thread of a Dask cluster: the jobs of a seed stay with one worker while it lives."""
+    """A lane for each thread of a Dask cluster. None is bound to a worker: Dask would wait for a dead one."""
     need("cluster")
     from distributed import Client
 
@@ -313,17 +332,13 @@ def _on_cluster(scheduler, stack):
         if code != fingerprint(WHOLE):
             raise ValueError(f"the worker {address} has other code of Dollop: {code}, here it is {fingerprint(WHOLE)}")
 
-    def lane(address):
-        def stop(executor):
-            executor.shutdown(wait=False)
+    lanes = sum(client.nthreads().values())
+    return [_Lane(partial(client.get_executor, pure=False), _let_go, _let_go, whole=True) for _ in range(lanes)]
 
-        def kill(executor):
-            stop(executor)
-            client.restart_workers([address], timeout=LIMIT, raise_for_error=False)
 
-        return _Lane(partial(client.get_executor, workers=[address], allow_other_workers=True), stop, kill)
-
-    return [lane(address) for address, threads in client.nthreads().items() for _ in range(threads)]
+def _let_go(executor):
+    """Take back what a cluster has been asked for."""
+    executor.shutdown(wait=False)
 
 
 @contextmanager

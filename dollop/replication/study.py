@@ -10,7 +10,7 @@ study/golden.json, the numbers of one seed that any machine must find again.
 import sys
 from functools import partial
 from itertools import chain
-from math import isfinite, nan
+from math import isfinite, isinf, nan
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +69,11 @@ def work(job, claims=CLAIMS):
     """
     id, seed = job
     found = claims[id].experiment(int(seed))
-    return {"numbers": " ".join(f"{each.number}={found[each.number]:.6g}" for each in claims[id].criteria)}
+    numbers = {each.number: float(found[each.number]) for each in claims[id].criteria}
+    for name, value in numbers.items():
+        if isinf(value):
+            raise ValueError(f"{name} must be finite or nan, got {value}")
+    return {"numbers": " ".join(f"{name}={value:.6g}" for name, value in numbers.items())}
 
 
 def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
@@ -146,10 +150,9 @@ def ledger_at(path):
 def is_sound(row):
     """Whether a line's numbers can be read."""
     try:
-        numbers_of(row)
+        return not any(map(isinf, numbers_of(row).values()))
     except ValueError:
         return False
-    return True
 
 
 def numbers_of(row):
