@@ -317,3 +317,12 @@ def test_a_walk_that_leaps_has_a_speed_of_this_world():
     """Over a part of the way that took no time it was 1e305 m/s."""
     law = dollop.SequencedLDS.fit([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]], retimed=False)
     assert law.profile.max() < 1e12 and np.isfinite(law.timed()[1]).all()
+
+
+def test_a_refused_matching_of_many_objects_is_told_in_a_line():
+    """However many there are."""
+    rng = np.random.default_rng(0)
+    here, there = (dollop.Environment(np.tile(rng.uniform(0, 6, (40, 2)), 2) + [0, 0, 0.4, 0.4]) for _ in range(2))
+    with pytest.raises(ValueError, match="cannot be matched with confidence: 0 .* move the objects apart$") as refused:
+        dollop.associate(LAW.subgoals, here).relocate(there)
+    assert len(str(refused.value)) <= 300
