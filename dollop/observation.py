@@ -673,6 +673,7 @@ def observe_as_paper(
     """
     check_positive("min_area", min_area, or_zero=True)
     check_positive("stride", stride, or_zero=True)
+    checked_number("the background's resolution", background.resolution, *RESOLUTIONS)
     tracker = tracker or Tracker()
     moving, static = ForegroundGrid(background, gain), ForegroundGrid(background, static_gain)
     objects = []

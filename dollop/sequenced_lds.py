@@ -33,7 +33,7 @@ LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none wou
 REACH = 0.01  # m, to which lines are rolled out
 TURNED = np.radians(10)  # over two decimetres: on a radius of 1.1 m, which is no corner
 ROUNDS = 8  # how often a walk is divided anew: nearly always two are enough
-MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
+MOST_CANDIDATES = 400  # all pairs of cuts are compared, and more take minutes
 MOST_TIMES = 1_000_000
 """Times of a response: more than a day, ten times a second."""
 
