@@ -107,7 +107,7 @@ def test_assumed_sides_are_four_for_each_box():
     """None where not given; another number of them is refused."""
     assert not Environment(BOXES).assumed.any()
     assert Environment(BOXES, assumed=[[0, 0, 0, 1], [1, 0, 0, 0]]).assumed.sum() == 2
-    with pytest.raises(ValueError, match=r"assumed must hold four sides .* shape \(1, 4\) for 2"):
+    with pytest.raises(ValueError, match=r"assumed must have shape \(2, 4\), got \(1, 4\)"):
         Environment(BOXES, assumed=np.zeros((1, 4), bool))
 
 

@@ -25,6 +25,7 @@ from math import atan2, cos, dist, inf, sin
 
 import numpy as np
 
+from dollop.checks import checked_number
 from dollop.law.line import Fading
 from dollop.lds import MOST_STEPS
 from dollop.pose import wrapped
@@ -84,7 +85,29 @@ class Limits(namedtuple("Limits", "speed turn acceleration turn_acceleration")):
         In m/s^2, and as much of braking.
     turn_acceleration : float
         In rad/s^2.
+
+    Raises
+    ------
+    ValueError
+        For what is not a positive number, a millionth at least and a million at most.
+
+    Examples
+    --------
+    >>> Limits(0.5, 0.8, 0.5, 0.0)
+    Traceback (most recent call last):
+    ValueError: turn_acceleration must be in 1e-06 to 1e+06, got 0.0
     """
+
+    __slots__ = ()
+
+    def __new__(cls, speed, turn, acceleration, turn_acceleration):
+        values = speed, turn, acceleration, turn_acceleration
+        pairs = zip(cls._fields, values, strict=True)
+        return super().__new__(cls, *(checked_number(name, value, 1e-6, 1e6) for name, value in pairs))
+
+    @classmethod
+    def _make(cls, values):
+        return cls(*values)
 
 
 PIONEER_LIMITS = Limits(0.5, 0.8, 0.5, 1.57)

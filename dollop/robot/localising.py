@@ -21,9 +21,10 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from dollop.checks import Note, checked_array
+from dollop.checks import Note, checked_array, checked_positions, checked_record, told
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.gridmap import in_cells
+from dollop.gridmap import OccupancyGrid, in_cells
+from dollop.laser import LaserLog
 from dollop.pose import between, composed, motion_between, poses_at, rotation, wrapped
 from dollop.robot.localization import (
     BEAM_STEP,
@@ -110,8 +111,8 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     Raises
     ------
     ValueError
-        If no place on the map explains the scans, the odometry is of another time than the log, or
-        the map has no free cell.
+        If no place on the map explains the scans, the odometry is of another time than the log, the
+        map has no free cell, or what is given is not of its kind.
 
     Examples
     --------
@@ -124,6 +125,8 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     >>> bool(np.abs(localise(drifting, None, OccupancyGrid.from_log(log)).poses).max() < 0.05)
     True
     """
+    checked_record("log", log, LaserLog)
+    checked_record("background", background, OccupancyGrid)
     by_odometry = _laser_odometry(log, odometry, laser)
     scans, follower = (
         _Scans(log, background),
@@ -143,15 +146,17 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
 
 def _laser_odometry(log, odometry, laser):
     """(T, 3) poses of the laser at the scans, by odometry."""
-    mount = checked_array("laser", laser, 3)
+    mount = checked_positions("laser", laser, 3)
     if odometry is None:
         return log.poses
     t, poses = (getattr(odometry, name, ()) for name in ("t", "poses"))
-    if not len(t):
-        raise ValueError(f"odometry must be an Odometry with a message, or None, got {odometry!r:.60}")
+    if not np.size(t):
+        raise ValueError(f"odometry must be an Odometry with a message, or None, got {told(odometry)}")
+    t = checked_array("the times of the odometry", t, "N")
+    poses = checked_positions("the poses of the odometry", poses, len(t), 3)
     if not ((log.t >= t[0] - 1) & (log.t <= t[-1] + 1)).any():
-        told = f"{t[0]:.10g} to {t[-1]:.10g} s for scans from {log.t[0]:.10g} to {log.t[-1]:.10g} s"
-        raise ValueError(f"odometry must be of the time of the log, got {told}")
+        times = f"{t[0]:.10g} to {t[-1]:.10g} s for scans from {log.t[0]:.10g} to {log.t[-1]:.10g} s"
+        raise ValueError(f"odometry must be of the time of the log, got {times}")
     return composed(poses_at(log.t, t, poses), mount)
 
 

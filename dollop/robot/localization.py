@@ -22,7 +22,7 @@ from math import pi
 import numpy as np
 import scipy
 
-from dollop.checks import checked_array
+from dollop.checks import checked_array, checked_generator
 from dollop.gridmap import covered_cells, distances_to, in_cells, in_metres
 from dollop.pose import rotation
 from dollop.robot.avoidance import FREE_BELOW
@@ -43,10 +43,10 @@ BEAM_STEP = 3
 LATTICE, HEADINGS = 0.15, 72
 """Distance in m between the poses of the lattice, and how many headings each place has."""
 MOST_POSES = 2_000_000
-"""Poses of the lattice that are weighed, the most promising: as many as there are on 600 m^2 of floor.
-In a hall of 200 m there are a hundred million, of 50 bytes for a moment each."""
+"""Poses of the lattice that are weighed, the most promising: as many as there are on 600 m^2 of
+floor. In a hall of 200 m there are a hundred million, of 50 bytes for a moment each."""
 SQUARE = 4
-"""Places of the lattice along the side of a square that is judged as a whole where there are many."""
+"""Places of the lattice along the side of a square that is judged as a whole if there are many."""
 BLOCK = 1 << 18
 """Numbers that are looked up at once for the lattice."""
 TRACKING, SEARCHING = 250, 3000
@@ -107,7 +107,7 @@ class MonteCarloLocalizer:
     """
 
     def __init__(self, background, angles, environment=None, pose=None, laser_offset=0.0, seed=0):
-        self._rng = np.random.default_rng(seed)
+        self._rng = checked_generator("seed", seed)
         self._bearings = np.asarray(angles, dtype=float)[::BEAM_STEP]
         self._laser_offset = laser_offset
         blocked, frame = background.occupied, (background.origin, background.resolution)
@@ -314,9 +314,9 @@ class LikelihoodField:
     def lattice_log_likelihoods(self, places, headings, ends, some=None, reach=1):
         """The same for places (N, 2) of each heading (K,) in rad, beams moved by whole cells: fast.
 
-        An iterator over (N,) float arrays; or only over some of the places, (N_k,) for each heading.
-        The border is as wide as the beams are long. With a reach in cells a beam counts as if it
-        had ended where it is likeliest in the square of that side to the right and above.
+        An iterator over (N,) float arrays; or only over some of the places, (N_k,) for each
+        heading. The border is as wide as the beams are long. With a reach in cells a beam counts as
+        if it had ended where it is likeliest in the square of that side to the right and above.
         """
         ends, most = self.within_reach(ends), np.array(self.shape) - 1
         longest = np.ceil(np.hypot(*ends.T).max(initial=0) / self.resolution) + 1
