@@ -349,6 +349,7 @@ def check_robot(robot, kidnap):
         check_has("a robot to be kidnapped", robot, "place")
     checked_number("the robot's period", robot.period, *PERIODS)
     checked_flag("whether the robot is localised", robot.localised)
+    checked_array("the robot's pose", robot.pose, 3, finite=False)  # one that is lost may have none
     check_has("the robot's limits", robot.limits, *Limits._fields)
     Limits(*(getattr(robot.limits, name) for name in Limits._fields))
 
