@@ -248,7 +248,7 @@ BAD_LINES = {
     "could not convert string to float: b.host": GOOD_LINE.replace("1.0 ", "", 1),
     "must be finite, .*, got nan": GOOD_LINE.replace("2.0", "nan", 1),
     "must be finite, .*, got inf": GOOD_LINE.replace("2.0", "inf", 1),
-    "a range must be finite and not negative, got -2.0": GOOD_LINE.replace("2.0", "-2.0", 1),
+    "a range must be finite, not negative .*, got -2": GOOD_LINE.replace("2.0", "-2.0", 1),
     "could not convert string to float: b'two'": GOOD_LINE.replace("2.0", "two", 1),
     "invalid literal for int.. with base 10: b'3.5'": GOOD_LINE.replace("FLASER 3", "FLASER 3.5"),
     "must be at least 1, got -3": GOOD_LINE.replace("FLASER 3", "FLASER -3"),
@@ -461,14 +461,14 @@ def robotlaser(start=-1.0, step=0.5, limit=8.0, ranges=(1.0, 2.0, 3.0), t=0.0):
 
 GOOD = flaser((1.0, 2.0, 3.0), t=99.0)
 NO_LASER = {
-    "a number has no underscore, got b'1_0'": GOOD.replace("1.0", "1_0", 1),
-    "a number of readings must be a whole number of at most nine digits, got b'0_3'": GOOD.replace("R 3", "R 0_3"),
-    "a number of readings must be a whole .*, got b'9999": GOOD.replace("R 3", "R " + "9" * 5000),
+    "could not convert string to float: b'1_0'": GOOD.replace("1.0", "1_0", 1),
+    "invalid literal for int.. with base 10: b'0_3'": GOOD.replace("R 3", "R 0_3"),
+    "a number of readings must have at most nine digits, got b'9999": GOOD.replace("R 3", "R " + "9" * 5000),
     "could not convert string to float: b'0x1p3'": GOOD.replace("1.0", "0x1p3", 1),
     r"could not convert string to float: b'.xd9.xa1'": GOOD.replace("1.0", "\u0661", 1),
-    r"must be finite, and within 1e\+10, got 1e\+300": GOOD.replace("1.0", "1e300", 1),
-    r"a range must be within 1e\+09 m, got 2e\+09 m": GOOD.replace("2.0", "2e9", 1),
-    r"a pose must be within 1e\+09 m, got 5e\+09 m": flaser((1.0, 2.0, 3.0), pose=(5e9, 0, 0)),
+    r"must be finite, and within 1e\+10, got 1e\+300": flaser((1.0, 2.0, 3.0), t="1e300"),
+    r"a range must be finite, not negative and within 1e\+09 m, got 2e\+09": GOOD.replace("2.0", "2e9", 1),
+    r"a pose must be within 1e\+09 m, got .5000000000.0, 0.0, 0.0": flaser((1.0, 2.0, 3.0), pose=(5e9, 0, 0)),
     "a scan must have 1 to 36000 beams, got 36001": flaser([1.0] * 36_001),
     "beams must spread over at most a full turn, got '3 beams from -1 rad": robotlaser(step=9),
     "beams must spread over at most a full turn, got '3 beams from 99 rad": robotlaser(start=99),
@@ -513,5 +513,5 @@ def test_more_readings_than_are_read(tmp_path, monkeypatch):
 
 def test_odometry_tells_what_is_wrong(tmp_path):
     """Where no message can be read, the first one is told."""
-    with pytest.raises(FormatError, match="line 1: a number has no underscore, got b'0_1' .1 of 1 scans are broken"):
+    with pytest.raises(FormatError, match="line 1: could not convert string to float: b'0_1' .1 of 1 scans are broken"):
         carmen_log.read_odometry(write(tmp_path / "a.log", ["ODOM 1 2 3 0_1 0 0 1 host 1"]))
