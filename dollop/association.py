@@ -277,7 +277,7 @@ class Frames:
 
     def __post_init__(self):
         positions = checked_positions("positions", self.positions)
-        directions = checked_array("directions", self.directions, len(positions), least=-FARTHEST, most=FARTHEST)
+        directions = checked_positions("directions", self.directions, len(positions))
         put_in(self, positions=positions, directions=wrapped(directions))
 
     def __repr__(self):

@@ -1,9 +1,9 @@
 """What is asked of input, and what is said of results: errors and notes name the value and the rule."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from importlib.util import find_spec
-from itertools import chain
+from itertools import chain, islice
 from reprlib import Repr
 
 import numpy as np
@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 FARTHEST = 1e9
-"""m from the origin, or rad: coordinates beyond are no metres, and lose the millimetre that tells two apart."""
+"""m from the origin, or rad: coordinates beyond are no metres, and lose the millimetre that tells."""
 LATEST = 1e11
 """s: three thousand years. What counts milliseconds since 1970 lies beyond, and is refused."""
 
@@ -63,7 +63,7 @@ class _Told(Repr):
 
 _REPR = _Told()
 _REPR.maxlevel, _REPR.maxstring, _REPR.maxother = 3, 45, 60
-_LARGEST = float(np.finfo(float).max)
+_LARGEST, _MOST_SEED = float(np.finfo(float).max), 2**128
 
 
 def told(value, most=60):
@@ -120,12 +120,19 @@ _REAL = int, float, np.integer, np.floating
 _NO_NUMBER = bool, np.timedelta64  # which Python and numpy count among the whole numbers
 _PLAIN = frozenset([int, float, *(np.dtype(code).type for code in "bBhHiIlLqQefdg")])
 _BUFFERS = str, bytes, bytearray, memoryview, np.ma.MaskedArray
+_MOST_RECORDS = 100_000
 _DEEPEST = 32  # axes: lists deeper than that hold themselves
 
 
 def _is_number(value):
     """Whether a value is a real number: no text, no truth value, no span of time."""
     return type(value) in _PLAIN or (isinstance(value, _REAL) and not isinstance(value, _NO_NUMBER))
+
+
+def _own(value):
+    """A number as one of Python's: half precision is not compared with what it does not hold."""
+    with np.errstate(over="ignore"):
+        return int(value) if isinstance(value, int | np.integer) else float(value)
 
 
 def _holds_numbers(values, depth=0):
@@ -148,13 +155,14 @@ def _check_shape(name, found, wanted):
     """Refuse another shape than the one wanted."""
     axes = found[max(len(found) - len(wanted) + 1, 0) :] if wanted[:1] == ("...",) else found
     sizes = wanted[1:] if wanted[:1] == ("...",) else wanted
-    if len(axes) != len(sizes) or any(n != m for n, m in zip(sizes, axes, strict=True) if not isinstance(n, str)):
+    named = [isinstance(n, str) or n == m for n, m in zip(sizes, axes, strict=False)]
+    if len(axes) != len(sizes) or not all(named):
         told_of = f"({wanted[0]},)" if len(wanted) == 1 else f"({', '.join(map(str, wanted))})"
         raise ValueError(f"{name} must have shape {told_of}, got {told(found)}")
 
 
 def check_positive(name, value, or_zero=False):
-    """Refuse a number that is negative, infinite or NaN, or zero unless that is allowed; and what is no number.
+    """Refuse what is no number, or is negative, infinite or NaN, or zero unless that is allowed.
 
     Parameters
     ----------
@@ -176,7 +184,7 @@ def check_positive(name, value, or_zero=False):
     Traceback (most recent call last):
     ValueError: tolerance must be positive and finite, got nan
     """
-    if not (_is_number(value) and (0 < value <= _LARGEST or (or_zero and value == 0))):
+    if not (_is_number(value) and (0 < _own(value) <= _LARGEST or (or_zero and value == 0))):
         rule = "finite and not negative" if or_zero else "positive and finite"
         raise ValueError(f"{name} must be {rule}, got {told(value)}")
 
@@ -204,15 +212,15 @@ def check_choice(name, value, known):
     Traceback (most recent call last):
     ValueError: control must be one of 'plain', 'pursuit', got 'plane'
     """
-    if isinstance(value, np.ndarray) or value not in list(known):
+    if not any(isinstance(value, type(each)) and value == each for each in known):
         raise ValueError(f"{name} must be one of {', '.join(map(repr, known))}, got {told(value)}")
 
 
 def checked_array(name, values, *shape, finite=True, least=-np.inf, most=np.inf):
-    """Values as a float array of their own, if they are numbers, their shape the one wanted and all finite.
+    """Values as a float array of their own, if they are numbers, finite and of the shape wanted.
 
-    Numbers are whole or real ones, of Python, numpy or pandas. Text, truth values, dates, None, complex
-    and masked arrays and arrays of objects are none, not even where one would go through for a number.
+    Numbers are whole or real ones, of Python, numpy or pandas. Text, truth values, dates, None,
+    complex and masked arrays and arrays of objects are none, nor is a list that holds one of them.
 
     Parameters
     ----------
@@ -246,6 +254,10 @@ def checked_array(name, values, *shape, finite=True, least=-np.inf, most=np.inf)
     Traceback (most recent call last):
     ValueError: speeds must be numbers in rows of one length, got [0.5, True]
     """
+    if (
+        type(values) is np.ndarray and values.dtype.kind in "iuf"
+    ):  # before it is copied: it may be one number, many times
+        _check_shape(name, values.shape, shape)
     array = _as_floats(name, values)
     _check_shape(name, array.shape, shape)
     bounded = least > -np.inf or most < np.inf
@@ -347,7 +359,7 @@ def checked_flags(name, values, *shape):
 
 
 def checked_number(name, value, least=-FARTHEST, most=FARTHEST):
-    """A value as a float, if it is a finite number within bounds, and neither text nor True nor False.
+    """A value as a float, if it is a finite number within bounds, and no text, True or False.
 
     Parameters
     ----------
@@ -372,9 +384,11 @@ def checked_number(name, value, least=-FARTHEST, most=FARTHEST):
     Traceback (most recent call last):
     ValueError: turn must be a finite number, got '0.4'
     """
-    if not _is_number(value):
-        raise ValueError(f"{name} must be a finite number, got {told(value)}")
-    if not least <= value <= most:
+    if type(value) is not float:
+        if not _is_number(value):
+            raise ValueError(f"{name} must be a finite number, got {told(value)}")
+        value = _own(value)
+    if not (least <= value <= most and (type(value) is float or abs(value) <= _LARGEST)):
         lost = max(-least, most) <= FARTHEST and not -FARTHEST <= value <= FARTHEST
         rule = f"a finite number within {FARTHEST:g}" if lost else f"in {least:g} to {most:g}"
         raise ValueError(f"{name} must be {rule}, got {told(value)}")
@@ -382,7 +396,7 @@ def checked_number(name, value, least=-FARTHEST, most=FARTHEST):
 
 
 def checked_whole(name, value, least=0, most=FARTHEST):
-    """A value as an int, if it is a whole number within bounds: 3 and 3.0 are, 1.9 and True are not.
+    """A value as an int, if it is a whole number within bounds: 3 or 3.0, not 1.9 or True.
 
     Parameters
     ----------
@@ -407,7 +421,7 @@ def checked_whole(name, value, least=0, most=FARTHEST):
     Traceback (most recent call last):
     ValueError: m must be a whole number, 1 to 8, got 1.9
     """
-    if not (_is_number(value) and least <= value <= most and value == int(value)):
+    if not (_is_number(value) and least <= _own(value) <= most and value == int(value)):
         raise ValueError(f"{name} must be a whole number, {least:.12g} to {most:.12g}, got {told(value)}")
     return int(value)
 
@@ -474,7 +488,7 @@ def checked_record(name, value, kind):
 
 
 def checked_records(name, values, kind):
-    """Values as a tuple, if all are records of the kind wanted.
+    """Values in order as a tuple, if all are records of the kind wanted, at most a hundred thousand.
 
     Parameters
     ----------
@@ -499,9 +513,12 @@ def checked_records(name, values, kind):
     ValueError: notes[1] must be a Note, got None
     """
     try:
-        values = tuple(values)
+        found = tuple(islice(None if isinstance(values, Mapping | Set) else values, _MOST_RECORDS + 1))
     except TypeError:
         raise ValueError(f"{name} must be several of {kind.__name__}, got {told(values)}") from None
+    if len(found) > _MOST_RECORDS:
+        raise ValueError(f"{name} must be at most {_MOST_RECORDS}, got {told(values)}")
+    values = found
     for k, value in enumerate(values):
         checked_record(f"{name}[{k}]", value, kind)
     return values
@@ -557,12 +574,11 @@ def checked_generator(name, seed):
     --------
     >>> checked_generator("seed", "luck")
     Traceback (most recent call last):
-    ValueError: seed must be a whole number from 0 on, or a Generator, got 'luck'
+    ValueError: seed, if no Generator, must be a whole number, 0 to 3.40282366921e+38, got 'luck'
     """
-    try:
-        return np.random.default_rng("a truth value" if isinstance(seed, bool) else seed)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a whole number from 0 on, or a Generator, got {told(seed)}") from None
+    if isinstance(seed, np.random.Generator):
+        return seed
+    return np.random.default_rng(checked_whole(f"{name}, if no Generator,", seed, 0, _MOST_SEED))
 
 
 def checked_positions(name, values, *shape):

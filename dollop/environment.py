@@ -48,6 +48,8 @@ _ONE_PLACE, _MOST_COSTS = (
     1e-12,
     2.0**53,
 )  # m²: corners that coincide; and what a whole number can be
+# Those of 500 objects: their springs take 250 MB.
+MOST_CORNERS = 2000
 
 
 LINK, SPACINGS = 0.15, 2.2
@@ -258,7 +260,7 @@ def spring_constants(corners):
     Raises
     ------
     ValueError
-        Where two corners coincide: their spring would be infinite.
+        Where two corners coincide: their spring would be infinite. More than 2000 corners.
 
     Examples
     --------
@@ -286,7 +288,7 @@ def spring_forces(corners):
     Raises
     ------
     ValueError
-        Where two corners coincide.
+        Where two corners coincide. More than 2000 corners.
 
     Examples
     --------
@@ -339,6 +341,8 @@ def integer_costs(corners_i, corners_j, alpha=1e3):
 def _springs(corners):
     """Spring constants (C, C) and differences omega_n - omega_m (C, C, 2) between corners."""
     corners = checked_positions("corners", corners)
+    if len(corners) > MOST_CORNERS:
+        raise ValueError(f"springs must be between at most {MOST_CORNERS} corners, got {len(corners)}")
     differences = corners - corners[:, None]
     squares = np.einsum("mnd,mnd->mn", differences, differences)
     np.fill_diagonal(squares, np.inf)

@@ -22,18 +22,13 @@ from dollop.checks import (
 from dollop.formats import carmen_map, ros_bag
 from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, check_cells, from_file
+from dollop.formats.writing import checked_path
 from dollop.laser import LaserLog
 
 __all__ = [
-    "SIDES",
-    "OccupancyGrid",
-    "check_is_map",
-    "covered_cells",
-    "distances_to",
-    "flat_cells",
-    "in_cells",
-    "in_metres",
-]
+    "SIDES", "OccupancyGrid", "check_is_map", "covered_cells", "distances_to", "flat_cells", "in_cells", "in_metres",
+    "map_inputs", "map_outputs",
+]  # fmt: skip
 
 FINEST = 1e-3
 """m: no laser tells more, and a beam passes so many cells."""
@@ -194,7 +189,7 @@ class OccupancyGrid:
         FormatError
             If the name says neither.
         OSError
-            If it cannot be written.
+            If it cannot be written, or what is there is no such map or the picture of another.
         """
         _format_of(path).write_map(path, self.occupancy, self.origin, self.resolution)
 
@@ -417,8 +412,45 @@ def check_is_map(path):
     FormatError
         If it ends neither in `.yaml` or `.yml` (ROS) nor in `.map` (CARMEN).
     """
-    if Path(path).suffix not in (".map", ".yaml", ".yml"):
+    if checked_path(path).suffix not in (".map", ".yaml", ".yml"):
         raise FormatError("a map is named .yaml (ROS) or .map (CARMEN)", path)
+
+
+def map_outputs(path):
+    """Files that `OccupancyGrid.save` writes.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the map.
+
+    Returns
+    -------
+    list of Output
+
+    Raises
+    ------
+    FormatError
+        If the name is not one of a map.
+    """
+    return _format_of(path).outputs(path)
+
+
+def map_inputs(path):
+    """Files that `OccupancyGrid.load` reads, as far as they are known before.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the map.
+
+    Returns
+    -------
+    list of str or Path
+    """
+    is_ros = Path(path).suffix in (".yaml", ".yml") and not ros_bag.is_bag(path)
+    picture = _format_of(path).picture_of(path) if is_ros else None
+    return [path] if picture is None else [path, picture]
 
 
 def _format_of(path):
@@ -632,7 +664,8 @@ def distances_to(cells, side=1.0):
     >>> distances_to(np.array([[True, False, False], [False, False, False]]), 0.5).round(3).tolist()
     [[0.0, 0.5, 1.0], [0.5, 0.707, 1.118]]
     """
-    nearest = scipy.ndimage.distance_transform_edt(~cells, side, return_distances=False, return_indices=True)
+    asked = {"return_distances": False, "return_indices": True}
+    nearest = scipy.ndimage.distance_transform_edt(~cells, side, **asked)
     distances, columns = np.empty(cells.shape), np.arange(cells.shape[1])
     for row, (near_row, near_column) in enumerate(zip(*nearest, strict=True)):
         down, right = (near_row - row) * side, (near_column - columns) * side

@@ -5,17 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from dollop.checks import (
-    FARTHEST,
     LATEST,
     Note,
     checked_array,
     checked_number,
+    checked_positions,
     checked_records,
     put_in,
 )
 from dollop.pose import wrapped
 
-__all__ = ["LaserLog"]
+__all__ = ["FULL_TURN", "LaserLog"]
 
 FULL_TURN = 2 * np.pi + 1e-6  # rad, and what rounding adds
 LEAST_RANGE = 1e-6  # m
@@ -68,7 +68,7 @@ class LaserLog:
         if 0 in (t.size, angles.size):
             raise ValueError(f"a log must hold a scan and a beam, got {t.size} and {angles.size}")
         ranges = checked_array("ranges", self.ranges, t.size, angles.size, finite=False)
-        poses = checked_array("poses", self.poses, t.size, 3, least=-FARTHEST, most=FARTHEST)
+        poses = checked_positions("poses", self.poses, t.size, 3)
         poses[:, 2] = wrapped(poses[:, 2])
         max_range = checked_number("max_range", self.max_range, LEAST_RANGE)
         _check_increasing("t", t)

@@ -15,10 +15,10 @@ from math import hypot
 import numpy as np
 
 from dollop.checks import (
-    FARTHEST,
     checked_array,
     checked_flag,
     checked_number,
+    checked_positions,
     checked_record,
     checked_whole,
     put_in,
@@ -34,12 +34,11 @@ STEPS, DECAY = 40, 3.0
 """A re-timed segment: its steps, and the time constants over which it decays."""
 
 MOST_STEPS = 100_000
-"""Steps of a response: one that keeps 0.9997 of its offset at each comes from 1e9 m to a micrometre in so
-many, and what is shown decays within some forty by e^3."""
+"""Steps of a response: one that keeps 0.9997 of its offset at each comes from 1e9 m to a micrometre
+in so many, and what is shown decays within some forty by e^3."""
 
 NOTHING = 1e-18
 """m^2: a squared length that counts as zero."""
-_WITHIN = {"least": -FARTHEST, "most": FARTHEST}
 _MOST, _ROUNDING = 1e30, 1e-4
 """m^2 that squared offsets within 1e9 m can sum up to; and share of them that rounding may have made, a
 fifth of what shrinkage adds."""
@@ -95,7 +94,15 @@ class Statistics:
         -------
         Statistics
             (..., d, d), m^2.
+
+        Raises
+        ------
+        ValueError
+            For what are no positions within 1e9 m, or none at all.
         """
+        samples = checked_positions("samples", samples, "...", "N", "d")
+        if not samples.shape[-2]:
+            raise ValueError(f"samples must hold one at least, got shape {samples.shape}")
         offsets = samples - samples[..., -1:, :]
         before = np.swapaxes(offsets[..., :-1, :], -1, -2)
         return cls(before @ offsets[..., :-1, :], np.swapaxes(before @ offsets[..., 1:, :], -1, -2))
@@ -149,7 +156,7 @@ class LDS:
     goal: np.ndarray
 
     def __post_init__(self):
-        put_in(self, goal=checked_array("goal", self.goal, 2, **_WITHIN))
+        put_in(self, goal=checked_positions("goal", self.goal, 2))
         checked_record("statistics", self.statistics, Statistics)
         (a, b), (c, d) = checked_array("G0", self.statistics.G0, 2, 2).tolist()
         size = max(a + d, NOTHING)
@@ -261,7 +268,7 @@ class LDS:
         >>> lds.step([2.0, 0.0])
         array([2., 0.])
         """
-        return self.goal + (checked_array("a state", x, "...", 2, **_WITHIN) - self.goal) @ self.A.T
+        return self.goal + (checked_positions("a state", x, "...", 2) - self.goal) @ self.A.T
 
     def response(self, x0, n):
         """The states from a start on (Sec. III).
@@ -292,7 +299,7 @@ class LDS:
         >>> np.allclose(lds.response([-5.0, 7.0], 500)[-1], lds.goal)
         True
         """
-        n, start = checked_whole("n", n, 0, MOST_STEPS), checked_array("a state", x0, 2, **_WITHIN)
+        n, start = checked_whole("n", n, 0, MOST_STEPS), checked_positions("a state", x0, 2)
         return self.goal + powers_on(self.A, start - self.goal, n)
 
     def lyapunov(self, x):
@@ -319,7 +326,7 @@ class LDS:
         >>> bool((np.diff(lds.lyapunov(lds.response([-5.0, 7.0], 30))) <= 0).all())
         True
         """
-        offset = checked_array("a state", x, "...", 2, **_WITHIN) - self.goal
+        offset = checked_positions("a state", x, "...", 2) - self.goal
         return dot(offset, np.linalg.solve(self.statistics.regular[0], offset[..., None])[..., 0])
 
 

@@ -46,6 +46,7 @@ from dollop.checks import (
     checked_flag,
     checked_number,
     checked_record,
+    checked_whole,
     checked_wholes,
     put_in,
     told,
@@ -74,6 +75,7 @@ _KAPPA = 1.0  # of the turns, von Mises: small ones are a little likelier
 _NARROWEST = 5.0  # m, side of a room
 _WHERETO = np.linspace(-2, 2, 9)  # standard deviations by which an object may have been moved
 
+MOST_OBJECTS = 500
 _EXACT = 12  # up to so many objects all matchings are summed
 _STARTS = 8  # so many of the alignments that fit best are refined, in so many steps
 _STEPS = 6
@@ -139,13 +141,13 @@ class Matching:
         if (taken[1:] == taken[:-1]).any():
             raise ValueError(f"a matching must not send two corners to one, got {told(indices.tolist())}")
         put_in(self, indices=indices, confident=checked_flag("confident", self.confident))
-        most = np.finfo(float).max
+        most = float(np.finfo(float).max)
         put_in(
             self,
-            cost=checked_number("cost", self.cost, -most, most),
+            cost=checked_number("cost", self.cost, 1 - _CERTAIN, most),
             turn=checked_number("turn", self.turn),
         )
-        put_in(self, margin=checked_number("margin", self.margin, -most, np.inf))
+        put_in(self, margin=checked_number("margin", self.margin, 1 - _CERTAIN, np.inf))
         self._check_probabilities()
 
     def _check_probabilities(self):
@@ -177,8 +179,13 @@ class Matching:
         Returns
         -------
         Matching
+
+        Raises
+        ------
+        ValueError
+            For what is no number of objects, or more than 10,000.
         """
-        return cls.of_partners(np.arange(n))
+        return cls.of_partners(np.arange(checked_whole("n", n, 0, _MOST_OBJECTS)))
 
     @classmethod
     def of_partners(cls, partners, turn=0.0):
@@ -259,7 +266,8 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     Parameters
     ----------
     environment_i, environment_j : Environment
-        Any number of objects. With "literal" at least two each.
+        At most 500 objects each: matching them takes some seconds and 700 MB. With "literal" at
+        least two each.
     method : {"robust", "literal"}
         "robust" compares the layouts and the sizes of the objects, knows what could be seen, and
         takes the corners from that; objects may be missing, added or split. "literal" is the
@@ -276,8 +284,8 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     Raises
     ------
     ValueError
-        What is no Environment; moves below a millimetre or beyond a kilometre. With "literal": fewer
-        than two objects, different counts, or corners that coincide.
+        What is no Environment, more than 500 objects; moves below a millimetre or beyond a kilometre.
+        With "literal": fewer than two objects, different counts, or corners that coincide.
 
     Examples
     --------
@@ -297,6 +305,9 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     moved = checked_number("moved", moved, *_MOVES)
     checked_record("environment_i", environment_i, Environment)
     checked_record("environment_j", environment_j, Environment)
+    most = max(len(environment_i), len(environment_j))
+    if most > MOST_OBJECTS:
+        raise ValueError(f"environments to match must have at most {MOST_OBJECTS} objects, got {most}")
     if method == "robust":
         return _match_robustly(environment_i, environment_j, moved)
     counts = f"{len(environment_i)} and {len(environment_j)}"

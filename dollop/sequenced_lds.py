@@ -191,7 +191,8 @@ class SequencedLDS:
         >>> len(law.segments), law.subgoals.round(6) + 0.0
         (1, array([[0., 1.]]))
         """
-        check_search(tolerance, n_segments, sample_period, candidates)
+        given = tolerance, n_segments, sample_period, candidates
+        tolerance, n_segments, sample_period, candidates = checked_search(*given)
         retimed = checked_flag("retimed", retimed)
         stands = [Stands.of(walk, sample_period) for walk in check_trajectories(trajectories)]
         walks = [each.walk for each in stands]
@@ -384,7 +385,7 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            A period that is not positive, or so short that there would be more than a million times.
+            A period that is not positive, or that makes more than a million times.
 
         Examples
         --------
@@ -396,7 +397,7 @@ class SequencedLDS:
         >>> bool(np.abs(positions[:, 0] - x[: len(t)]).max() < 0.05), float(t[-1].round(1))
         (True, 4.5)
         """
-        checked_number("period", period, *PERIODS)
+        period = checked_number("period", period, *PERIODS)
         speeds = self.speeds[:, None] if self.profile is None else self.profile
         pauses = np.zeros(len(self.segments) + 1) if self.pauses is None else self.pauses
         when, places = times_along([line.places for line in self.lines()], speeds, pauses)
@@ -534,13 +535,14 @@ def chord_angles(start, subgoals):
     return np.arctan2(chords[:, 1], chords[:, 0])
 
 
-def check_search(tolerance, n_segments, sample_period, candidates):
-    """Raise ValueError for a parameter of `SequencedLDS.fit` that is out of its range."""
-    checked_number("tolerance", tolerance, LEAST_REACH)
-    checked_number("sample_period", sample_period, *PERIODS)
+def checked_search(tolerance, n_segments, sample_period, candidates):
+    """The parameters of `SequencedLDS.fit`; ValueError for one that is out of its range."""
+    tolerance = checked_number("tolerance", tolerance, LEAST_REACH)
+    sample_period = checked_number("sample_period", sample_period, *PERIODS)
     candidates = checked_whole("candidates", candidates, 3, MOST_CANDIDATES)
     if n_segments is not None:  # each of them takes two candidates
-        checked_whole("n_segments", n_segments, 1, (candidates - 1) // 2)
+        n_segments = checked_whole("n_segments", n_segments, 1, (candidates - 1) // 2)
+    return tolerance, n_segments, sample_period, candidates
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from dollop.checks import (
     trusted,
 )
 from dollop.environment import Environment
+from dollop.formats.kinds import TASK
 from dollop.formats.writing import whole_file
 from dollop.laps import cut_laps
 from dollop.learning.anchored import learn_anchored, tied_to_corners, told_of_places
@@ -30,7 +31,7 @@ from dollop.learning.saving import as_dict, read_task
 from dollop.learning.way import Way
 from dollop.matching import Matching
 from dollop.sequenced_lds import LEAST_REACH, PERIODS, SequencedLDS
-from dollop.trajectory import check_trajectories, ways_apart
+from dollop.trajectory import check_trajectories, is_one, ways_apart
 
 __all__ = ["Demonstration", "Task", "learn"]
 
@@ -67,10 +68,9 @@ class Demonstration:
     notes: tuple = ()
 
     def __post_init__(self):
-        walks = check_trajectories(self.trajectory)
+        one, walks = is_one(self.trajectory), check_trajectories(self.trajectory)
         for walk in walks:
             walk.flags.writeable = False
-        one = np.ndim(self.trajectory[0]) == 1
         put_in(
             self,
             trajectory=walks[0] if one else walks,
@@ -202,14 +202,16 @@ class Task:
         shown = checked_records("demonstrations", self.demonstrations, Demonstration)
         ways = checked_records("ways", self.ways, SequencedLDS) or (law,)
         objects = np.arange(count) if self.objects is None else self.objects
+        objects = checked_wholes("objects", objects, "N", least=-1, most=count - 1)
+        counts = self.shown if np.size(self.shown) else (len(shown),)
         put_in(
             self,
             demonstrations=shown,
             notes=checked_records("notes", self.notes, Note),
             ways=ways,
-            shown=tuple(checked_wholes("shown", self.shown or (len(shown),), len(ways)).tolist()),
-            partners=tuple(map(_partners, checked_records("partners", self.partners, object))),
-            objects=checked_wholes("objects", objects, "N", least=-1, most=count - 1),
+            shown=tuple(checked_wholes("shown", counts, len(ways)).tolist()),
+            partners=checked_partners(self.partners, shown, len(objects)),
+            objects=objects,
             learned=checked_records("learned", self.learned, Way),
         )
 
@@ -388,9 +390,9 @@ class Task:
         Raises
         ------
         OSError
-            Where the file cannot be written.
+            Where the file cannot be written, or what is there is not a task.
         """
-        with whole_file(path, "w") as stream:
+        with whole_file(path, "w", TASK) as stream:
             json.dump(as_dict(self), stream, indent=1, default=np.ndarray.tolist)
             stream.write("\n")
 
@@ -427,7 +429,7 @@ def _laid_out(known, environment, objects, turn=0.0):
     placed = [way.among(environment, partners, turn) for way in ways]
     laws, kept = zip(*(way.law(now) for way, now in zip(ways, placed, strict=True)), strict=True)
     tied = tied_to_corners(ways[0], placed[0], laws[0], environment, objects)
-    notes = dict.fromkeys((*known["notes"], *told_of_places(ways, kept, partners)))
+    notes = tuple(dict.fromkeys((*known["notes"], *told_of_places(ways, kept, partners))))
     shown = tuple(len(way.members) for way in ways)
     return Task(
         laws[0],
@@ -439,13 +441,25 @@ def _laid_out(known, environment, objects, turn=0.0):
     )
 
 
-def _partners(partners):
-    """The objects (N,) that those of a demonstration are, or None for one that was set aside."""
-    if partners is None:
-        return None
-    partners = checked_wholes("partners", partners, "N", least=-1)
-    partners.flags.writeable = False
-    return partners
+def checked_partners(partners, demonstrations, n):
+    """For each demonstration which of n objects its own are, (N_k,) int array or None, a tuple; or none.
+
+    Raises
+    ------
+    ValueError
+        Another number of demonstrations or of objects, or what is no number of an object.
+    """
+    partners = checked_records("partners", partners, object)
+    if len(partners) not in (0, len(demonstrations)):
+        rule = f"partners must be given for each of {len(demonstrations)} demonstrations"
+        raise ValueError(f"{rule}, got {len(partners)}")
+    found = []
+    for each, shown in zip(partners, demonstrations, strict=False):
+        if each is not None:
+            each = checked_wholes("partners", each, len(shown.environment), least=-1, most=n - 1)
+            each.flags.writeable = False
+        found.append(each)
+    return tuple(found)
 
 
 def layout_turn_of(before, after, matching):

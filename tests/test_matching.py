@@ -447,3 +447,12 @@ def test_bad_input_is_refused():
         match(two, two, method="hungarian")
     with pytest.raises(ValueError, match="moved must be in 0.001 to 1000, got 0"):
         match(two, three, moved=0)
+
+
+@pytest.mark.parametrize("method", ["robust", "literal"])
+def test_thousands_of_objects_are_refused(method):
+    """A rule that is named, and no memory of gigabytes."""
+    low = np.stack(np.meshgrid(np.arange(30), np.arange(30)), axis=-1).reshape(-1, 2)
+    many = Environment(np.hstack([low, low + 0.5]))
+    with pytest.raises(ValueError, match="must have at most 500 objects, got 900"):
+        match(many, many, method=method)

@@ -13,6 +13,7 @@ import numpy as np
 
 from dollop.checks import FARTHEST, check_positive, checked_number, told
 from dollop.formats.files import MAX_LINES, FormatError, from_file, read_lines
+from dollop.formats.kinds import CARMEN_LOG
 from dollop.formats.odometry import Odometry
 from dollop.formats.scans import (
     MAX_READINGS,
@@ -314,7 +315,7 @@ def write_log(path, log):
         raise ValueError(f"the beams of a CARMEN log must be evenly spaced, these are up to {uneven:.3g} rad off")
     laser = " ".join(repr(float(value)) for value in (log.angles[0], fov, step, log.max_range))
     head = f"ROBOTLASER1 {UNKNOWN_TYPE} {laser} 0.001 0 {count}"
-    with whole_file(path) as stream, _packed(stream, path) as text:
+    with whole_file(path, kind=CARMEN_LOG) as stream, _packed(stream, path) as text:
         text.write(b"# CARMEN Logfile\n# distances in m, angles in rad, times in s\n")
         for t, ranges, pose in zip(log.t, _written_ranges(log), log.poses, strict=True):
             numbers = " ".join([f"{value:.3f}" for value in ranges.tolist()])

@@ -14,9 +14,10 @@ from dollop.formats.files import (
     read_bytes,
     written_number,
 )
-from dollop.formats.writing import whole_file
+from dollop.formats.kinds import CARMEN_MAP
+from dollop.formats.writing import Output, whole_file
 
-__all__ = ["OCCUPIED_FROM", "read_map", "write_map"]
+__all__ = ["OCCUPIED_FROM", "outputs", "read_map", "write_map"]
 
 OCCUPIED_FROM = 0.5
 """Probability from which a cell is occupied (`occupied_prob` in CARMEN's parameters)."""
@@ -105,6 +106,20 @@ def _map_origin(path, head, resolution):
     return tuple(from_file(path, written_number, name, each) for each in corner)
 
 
+def outputs(path):
+    """What `write_map` writes.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    list of Output
+    """
+    return [Output(path, CARMEN_MAP)]
+
+
 def write_map(path, occupancy, origin, resolution):
     """Write an occupancy grid as a CARMEN map file; see `read_map`.
 
@@ -128,7 +143,7 @@ def write_map(path, occupancy, origin, resolution):
     chunk = b"GRIDMAP   " + struct.pack("<iif", width, height, resolution) + cells
     head = f"# Map size      : {width} x {height}\n# Resolution    : {resolution:g}\n"
     head += f"# Lower left    : {float(origin[0])!r} {float(origin[1])!r}\n"
-    with whole_file(path) as stream:
+    with whole_file(path, kind=CARMEN_MAP) as stream:
         stream.write(b"# Carnegie Mellon Robot Toolkit (CARMEN) map file\n")
         stream.write(head.encode() + MAP_LABEL)
         stream.write(struct.pack("<Bi", GRIDMAP_CHUNK, len(chunk)) + chunk)

@@ -143,6 +143,7 @@ def warn_of(path, text):
 @contextmanager
 def _opened(path):
     """The file as it is unpacked, for reading, and its size in bytes as it lies there."""
+    path = os.fspath(path)  # a number would be taken for a file that is open already
     if os.path.exists(path) and not os.path.isfile(path):
         kind = "a folder" if os.path.isdir(path) else "a device or a pipe"
         raise FormatError(f"must be an ordinary file, and is {kind}", path)

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from dollop.checks import checked_array, need
-from dollop.formats.bag_bounds import bound_chunks, check_bag
 from dollop.formats.files import FormatError, check_cells, from_file
 from dollop.formats.odometry import Odometry
+from dollop.formats.ros_bag_bounds import bound_chunks, check_bag
 from dollop.formats.ros_frames import Link, laser_poses, planar
 from dollop.formats.scans import (
     MAX_READINGS,
@@ -83,7 +83,7 @@ def read_log(path, topic=None):
     FormatError
         If the file is no bag, holds no such topic or several to choose from, more than a few scans
         are broken, or one has beams or ranges that no laser has; or if there are more than 100
-        million readings, or what `dollop.formats.bag_bounds` refuses.
+        million readings, or what `dollop.formats.ros_bag_bounds` refuses.
 
     Warns
     -----

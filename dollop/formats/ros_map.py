@@ -4,23 +4,26 @@ Grey v of the picture, whose first row is the highest y, means the probability (
 unless `negate`; see http://wiki.ros.org/map_server.
 """
 
+import hashlib
 import io
 import os
 import re
 import struct
 import warnings
+from contextlib import suppress
 
 import numpy as np
 import yaml
-from PIL import Image, PngImagePlugin, PpmImagePlugin
+from PIL import PngImagePlugin, PpmImagePlugin
 
 from dollop.checks import check_choice, told
 from dollop.formats.carmen_map import OCCUPIED_FROM
 from dollop.formats.files import FormatError, check_cells, from_file, read_bytes, written_number
-from dollop.formats.writing import whole_file
-from dollop.formats.yaml_nodes import plain_nodes
+from dollop.formats.kinds import PGM, ROS_MAP
+from dollop.formats.plain_yaml import plain_nodes
+from dollop.formats.writing import Output, together, whole_file
 
-__all__ = ["read_map", "write_map"]
+__all__ = ["outputs", "picture_of", "read_map", "write_map"]
 
 UNKNOWN_GREY = (127, 128)
 """Written maps have thresholds that make these two greys, and no other, the unknown."""
@@ -61,11 +64,48 @@ PAIR = re.compile(rb"^# dollop pair ([0-9a-f]{16})$", re.MULTILINE)
 """The comment by which the two files of a map know each other, in both of them."""
 
 
+def outputs(path):
+    """What `write_map` writes: the YAML, and its picture.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    list of Output
+        The picture lies beside the YAML, or where that is a link, beside the file it points to.
+    """
+    picture = os.path.splitext(os.path.realpath(path) if os.path.islink(path) else path)[0] + ".pgm"
+    return [Output(path, ROS_MAP), Output(picture, PGM, of=path)]
+
+
+def picture_of(path):
+    """The picture that a map names.
+
+    Parameters
+    ----------
+    path : str or Path
+        The YAML.
+
+    Returns
+    -------
+    str or None
+        Its path; None where the map cannot be read, or names none that is there.
+    """
+    with suppress(OSError, ValueError):
+        # If the YAML is a link, beside either.
+        folders = map(os.path.dirname, (path, os.path.realpath(path)))
+        places = [os.path.join(folder, str(_read_keys(path).get("image"))) for folder in folders]
+        return next(filter(os.path.exists, places), None)
+
+
 def write_map(path, occupancy, origin, resolution):
     """Write a map as YAML with a PGM of the same name beside it; both appear, or neither.
 
     Occupied, free and unknown cells come back as they were, in trinary mode of map_server
-    (http://wiki.ros.org/map_server); probabilities come back to a 255th.
+    (http://wiki.ros.org/map_server); probabilities come back to a 255th. Both files carry the same
+    mark, made from what they hold, as a comment: one of another map is told by it.
 
     Parameters
     ----------
@@ -78,7 +118,7 @@ def write_map(path, occupancy, origin, resolution):
     resolution : float
         Side of a cell in m.
     """
-    image = os.path.splitext(path)[0] + ".pgm"
+    image = outputs(path)[1].path
     grey, (low, high) = np.rint(255 * (1 - occupancy)), UNKNOWN_GREY
     occupied, free = occupancy >= OCCUPIED_FROM, occupancy < OCCUPIED_FROM
     sides = np.minimum(grey, low - 1), np.maximum(grey, high + 1)
@@ -87,10 +127,13 @@ def write_map(path, occupancy, origin, resolution):
     meaning = {"negate": 0, "occupied_thresh": 0.505, "free_thresh": 0.495}
     keys = {"image": os.path.basename(image), "mode": "trinary", **place, **meaning}
     layout = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True}
-    with whole_file(path) as stream, whole_file(image) as picture:
-        stream.write(yaml.safe_dump(keys, **layout).encode())
-        stream.flush()  # so that nothing is left to fail once the picture has its name
-        Image.fromarray(grey[::-1]).save(picture, "PPM")
+    text, cells = yaml.safe_dump(keys, **layout).encode(), grey[::-1].tobytes()
+    mark = f"# dollop pair {hashlib.sha256(text + cells).hexdigest()[:16]}\n".encode()
+    with together():
+        with whole_file(image, kind=PGM, of=path) as stream:
+            stream.write(b"P5\n%s%d %d\n255\n" % (mark, *grey.T.shape) + cells)
+        with whole_file(path, kind=ROS_MAP) as stream:
+            stream.write(text + mark)
 
 
 def read_map(path):

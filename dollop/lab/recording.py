@@ -11,12 +11,13 @@ import numpy as np
 import pandas as pd
 
 from dollop.formats.files import FormatError, read_bytes, written_number
+from dollop.formats.kinds import CARMEN_LOG, SCENE, TRUTH
 from dollop.formats.logs import read_log, write_log
-from dollop.formats.writing import whole_file
+from dollop.formats.writing import Output, together, whole_file
 from dollop.lab.scenes import Scene
 from dollop.laser import LaserLog
 
-__all__ = ["MOVED_COLUMNS", "ROBOT_COLUMNS", "Recording", "TRUTH_COLUMNS"]
+__all__ = ["MOVED_COLUMNS", "ROBOT_COLUMNS", "Recording", "TRUTH_COLUMNS", "outputs"]
 
 TRUTH_COLUMNS = ["t", "x", "y", "heading"]
 """Of the first person; the others' end in their number: x_1, y_1, heading_1."""
@@ -52,19 +53,25 @@ class Recording:
         return f"Recording: {self.log}; {self.scene}"
 
     def save(self, path):
-        """Write the log, and beside it the truth and the scene.
+        """Write the log, and beside it the truth and the scene: all of them, or none.
 
         Parameters
         ----------
         path : str or Path
             Of a CARMEN log, .log or .log.gz. For `walk.log.gz` the others are `walk_truth.csv` and
             `walk_scene.json`.
+
+        Raises
+        ------
+        OSError
+            Where a file cannot be written, or what is there is of another kind.
         """
-        write_log(path, self.log)
         truth, scene = companions(path)
-        with whole_file(truth, "w") as stream:
-            self.truth.to_csv(stream, index=False, float_format="%.4f")
-        self.scene.save(scene)
+        with together():
+            with whole_file(truth, "w", TRUTH) as stream:
+                self.truth.to_csv(stream, index=False, float_format="%.4f")
+            self.scene.save(scene)
+            write_log(path, self.log)
 
     @classmethod
     def load(cls, path):
@@ -92,6 +99,23 @@ class Recording:
                 rule = "a recording has its truth and its scene beside its log"
                 raise FormatError(f"{rule}, this is missing", each)
         return cls(log, load_truth(truth_path, len(log)), Scene.load(scene_path))
+
+
+def outputs(path):
+    """What `Recording.save` writes.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the log.
+
+    Returns
+    -------
+    list of Output
+        Log, truth and scene.
+    """
+    truth, scene = companions(path)
+    return [Output(path, CARMEN_LOG), Output(truth, TRUTH), Output(scene, SCENE)]
 
 
 def load_truth(path, n_scans):

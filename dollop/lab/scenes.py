@@ -12,6 +12,7 @@ import numpy as np
 
 from dollop.checks import checked_array, put_in, told
 from dollop.formats.files import check_fields, from_file, read_json
+from dollop.formats.kinds import SCENE
 from dollop.formats.writing import whole_file
 from dollop.lab.outlines import Outline, gaps
 from dollop.lab.person import SHOULDERS
@@ -156,8 +157,13 @@ class Scene:
         Parameters
         ----------
         path : str or Path
+
+        Raises
+        ------
+        OSError
+            Where the file cannot be written, or what is there is not a scene.
         """
-        with whole_file(path, "w") as stream:
+        with whole_file(path, "w", SCENE) as stream:
             json.dump(self.to_dict(), stream)
 
     @classmethod

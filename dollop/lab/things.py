@@ -7,15 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dollop.checks import (
-    check_choice,
-    check_positive,
-    checked_array,
-    checked_number,
-    checked_positions,
-    put_in,
-    told,
-)
+from dollop.checks import check_choice, check_positive, checked_array, checked_number, checked_positions, put_in, told
 from dollop.lab.outlines import Outline
 from dollop.lab.scanner import Scanner, SickLMS200
 from dollop.pose import moved_pose

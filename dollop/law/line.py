@@ -251,8 +251,8 @@ class Fading:
 def check_ends(steps, goal, reach):
     """Refuse to follow a response any longer that has not come within reach of its subgoal.
 
-    Every one comes there, but some do so too late: where an LDS hardly decays, or where coordinates are
-    so large that places within reach of each other are the same number.
+    Every one comes there, but some do so too late: where an LDS hardly decays, or where
+    coordinates are so large that none need lie within reach of another.
 
     Parameters
     ----------

@@ -39,7 +39,8 @@ CROWDING = 4.0
 OPEN_BORDER = 3.0
 """Border in m of a world without a map round all that is in it."""
 MOST_CELLS, COARSEST = 3_000_000, 0.5
-"""Cells of a map at most, of 300 bytes each where a shortest way is looked for; and their side in m at most."""
+"""Cells of a map at most, of 300 bytes each where a shortest way is looked for; and their side in m
+at most."""
 AHEAD = 6
 """Cells of a shortest way over which its direction is taken: one alone knows eight directions."""
 
@@ -78,7 +79,8 @@ class ObstacleMap:
 
     def __post_init__(self):
         if min(np.shape(self.distances), default=0) < 2 or np.ndim(self.distances) != 2:
-            raise ValueError(f"distances must have two rows and columns, got shape {np.shape(self.distances)}")
+            shape = np.shape(self.distances)
+            raise ValueError(f"distances must have two rows and columns, got shape {shape}")
 
     @cached_property
     def _lookup(self):
@@ -93,10 +95,10 @@ class ObstacleMap:
     def of(cls, environment, background=None, places=(), radius=ROBOT_RADIUS, resolution=0.05):
         """The obstacles of an environment before a background (reconstruction).
 
-        A map of more than three million cells is made of larger ones: without a background of about so
-        many, with one of squares of its cells. What reaches into a cell fills it, and half a cell more is
-        taken off every distance, so that there is never less room than there seems to be. That is
-        what 86 m x 86 m take at 5 cm; 800 m there and back along a square have cells of 12 cm.
+        A map of more than three million cells, 86 m x 86 m at 5 cm, is made of larger ones: without
+        a background of about so many, with one of squares of its cells. What reaches into a cell
+        fills it, and half a cell more is taken off every distance, so that there is never less room
+        than there seems to be. Along a square of 200 m cells have 12 cm.
 
         Parameters
         ----------
@@ -419,21 +421,21 @@ def towards(x, y, from_x=0.0, from_y=0.0):
 
 
 def open_frame(boxes, places, resolution):
-    """Lower left corner, side of a cell and shape of a map that holds boxes (N, 4) and places (M, 2) in m."""
+    """Lower left corner, cells' side and shape of a map that holds boxes (N, 4), places (M, 2) in m."""
     points = np.vstack([boxes.reshape(-1, 2), np.reshape(places, (-1, 2))])
     if not len(points):
         points = np.zeros((1, 2))
     low, high = points.min(axis=0) - OPEN_BORDER, points.max(axis=0) + OPEN_BORDER
     side = max(resolution, float(np.sqrt(np.prod(high - low) / MOST_CELLS)))
     if not side <= max(COARSEST, resolution):
-        rule = f"without a map, {MOST_CELLS} cells of {COARSEST:g} m must hold all places and objects"
-        raise ValueError("{}, got {:.4g} m x {:.4g} m".format(rule, *(high - low)))
+        rule = f"{MOST_CELLS} cells of {COARSEST:g} m must hold all places and objects"
+        raise ValueError("without a map {}, got {:.4g} m x {:.4g} m".format(rule, *(high - low)))
     columns, rows = np.ceil((high - low) / side).astype(int)
     return tuple(low.tolist()), side, (rows, columns)
 
 
 def blocked_by(background):
-    """Cells (H, W) of a map that are not free, of two rows and columns at least; the border is not."""
+    """Cells (H, W) of a map that are not free, at least (2, 2); its border never is."""
     blocked = ~(background.occupancy < FREE_BELOW)
     blocked[[0, -1]], blocked[:, [0, -1]] = True, True
     lacking = np.maximum(2 - np.array(blocked.shape), 0)
@@ -441,7 +443,7 @@ def blocked_by(background):
 
 
 def coarser(blocked, side):
-    """Blocked cells (H, W) and their side in m, of larger squares if they are more than `MOST_CELLS`."""
+    """Blocked cells (H, W) and their side in m, of larger ones if there are too many."""
     times = int(np.ceil(np.sqrt(blocked.size / MOST_CELLS)))
     if times == 1:
         return blocked, side

@@ -25,6 +25,7 @@ from math import atan2, cos, dist, inf, sin
 
 import numpy as np
 
+from dollop.checks import checked_number
 from dollop.law.line import Fading
 from dollop.lds import MOST_STEPS
 from dollop.pose import wrapped
@@ -54,8 +55,8 @@ STRAY, JUMP = 0.3, 0.3
 """Distances in m: from its response, at which it is rolled out anew from where the robot is; and in
 one control period, that no robot drives: it has been kidnapped."""
 FARTHEST, LONGEST = 100.0, 10_000.0
-"""Lengths in m after which a response that has not come to its subgoal is given up: so far, or three times as
-far as it is there and along the segment's line; and in any case."""
+"""Lengths in m after which a response that has not come to its subgoal is given up: so far, or three
+times as far as it is to the segment's line and along it; and in any case."""
 LEAST_SPEED = 0.1
 """Speed in m/s that a segment is driven at even where the user hardly moved."""
 SHARP = 1.2
@@ -84,7 +85,29 @@ class Limits(namedtuple("Limits", "speed turn acceleration turn_acceleration")):
         In m/s^2, and as much of braking.
     turn_acceleration : float
         In rad/s^2.
+
+    Raises
+    ------
+    ValueError
+        For what is not a positive number, a millionth at least and a million at most.
+
+    Examples
+    --------
+    >>> Limits(0.5, 0.8, 0.5, 0.0)
+    Traceback (most recent call last):
+    ValueError: turn_acceleration must be in 1e-06 to 1e+06, got 0.0
     """
+
+    __slots__ = ()
+
+    def __new__(cls, speed, turn, acceleration, turn_acceleration):
+        values = speed, turn, acceleration, turn_acceleration
+        pairs = zip(cls._fields, values, strict=True)
+        return super().__new__(cls, *(checked_number(name, value, 1e-6, 1e6) for name, value in pairs))
+
+    @classmethod
+    def _make(cls, values):
+        return cls(*values)
 
 
 PIONEER_LIMITS = Limits(0.5, 0.8, 0.5, 1.57)
@@ -252,8 +275,9 @@ class Guidance:
             return np.ones(len(places))
         line, along = self._lines[k], self._relative[k]
         parts = np.array_split(places, 1 + len(places) * len(line.places) // AT_ONCE)
-        nearest = [((part[:, None] - line.places) ** 2).sum(axis=2).argmin(axis=1) for part in parts]
-        share = line.way[np.concatenate(nearest)] / max(line.way[-1], STEP)
+        squared = (((part[:, None] - line.places) ** 2).sum(axis=2) for part in parts)
+        nearest = np.concatenate([each.argmin(axis=1) for each in squared])
+        share = line.way[nearest] / max(line.way[-1], STEP)
         return along[np.minimum((share * len(along)).astype(int), len(along) - 1)]
 
     def _leg(self, k, x, y, at=None):
@@ -332,13 +356,14 @@ class Held:
         self.fading = Fading(self.line, here, x - line_x, y - line_y)
 
     def ahead(self, x, y):
-        """The first of the coming states that is 5 cm from x, y in m, or the subgoal if it comes before.
+        """The first of the coming states that is 5 cm from x, y in m.
 
-        Or if the state is not there after a hundred thousand steps.
+        Or the subgoal if it comes before, or is not there after a hundred thousand steps.
         """
         goal = self.places[-1]
         while dist(self.state, (x, y)) < STEP:
-            if self.at >= self.last and (dist(self.state, goal) < STEP or self.at > self.last + MOST_STEPS):
+            late = self.at > self.last + MOST_STEPS
+            if late or (self.at >= self.last and dist(self.state, goal) < STEP):
                 return goal
             self.at += 1
             line_x, line_y = self.places[min(self.at, self.last)]

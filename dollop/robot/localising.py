@@ -21,9 +21,10 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from dollop.checks import Note, checked_array
+from dollop.checks import Note, checked_array, checked_positions, checked_record, told
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.gridmap import in_cells
+from dollop.gridmap import OccupancyGrid, in_cells
+from dollop.laser import LaserLog
 from dollop.pose import between, composed, motion_between, poses_at, rotation, wrapped
 from dollop.robot.localization import (
     BEAM_STEP,
@@ -76,8 +77,8 @@ KERNEL = np.array([[-1.0], [0.0], [1.0]]) * np.ones((1, 3))
 BORDER = 1.0
 """m round the map where beams may end."""
 TILE, HALO = 1024, 2.0
-"""Cells along a side of the parts of a large map that are made ready when a beam ends there, and how many m
-round each count for it: ten standard deviations of the widest field, so that nothing farther pulls."""
+"""Cells along a side of the parts of a large map that are made ready when a beam ends there, and how
+many m round each count: ten standard deviations of the widest field, so that nothing farther pulls."""
 
 
 def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
@@ -110,8 +111,8 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     Raises
     ------
     ValueError
-        If no place on the map explains the scans, the odometry is of another time than the log, or
-        the map has no free cell.
+        If no place on the map explains the scans, the odometry is of another time than the log, the
+        map has no free cell, or what is given is not of its kind.
 
     Examples
     --------
@@ -124,6 +125,8 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     >>> bool(np.abs(localise(drifting, None, OccupancyGrid.from_log(log)).poses).max() < 0.05)
     True
     """
+    checked_record("log", log, LaserLog)
+    checked_record("background", background, OccupancyGrid)
     by_odometry = _laser_odometry(log, odometry, laser)
     scans, follower = (
         _Scans(log, background),
@@ -143,15 +146,17 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
 
 def _laser_odometry(log, odometry, laser):
     """(T, 3) poses of the laser at the scans, by odometry."""
-    mount = checked_array("laser", laser, 3)
+    mount = checked_positions("laser", laser, 3)
     if odometry is None:
         return log.poses
     t, poses = (getattr(odometry, name, ()) for name in ("t", "poses"))
-    if not len(t):
-        raise ValueError(f"odometry must be an Odometry with a message, or None, got {odometry!r:.60}")
+    if not np.size(t):
+        raise ValueError(f"odometry must be an Odometry with a message, or None, got {told(odometry)}")
+    t = checked_array("the times of the odometry", t, "N")
+    poses = checked_positions("the poses of the odometry", poses, len(t), 3)
     if not ((log.t >= t[0] - 1) & (log.t <= t[-1] + 1)).any():
-        told = f"{t[0]:.10g} to {t[-1]:.10g} s for scans from {log.t[0]:.10g} to {log.t[-1]:.10g} s"
-        raise ValueError(f"odometry must be of the time of the log, got {told}")
+        times = f"{t[0]:.10g} to {t[-1]:.10g} s for scans from {log.t[0]:.10g} to {log.t[-1]:.10g} s"
+        raise ValueError(f"odometry must be of the time of the log, got {times}")
     return composed(poses_at(log.t, t, poses), mount)
 
 
@@ -296,7 +301,8 @@ class _Search:
 
     def _drawn(self, scan):
         """Poses (N, 3) of the lattice that explain a scan best, one of each surroundings."""
-        chosen, scores = self._follower.lattice_scores(self._scans.ends[scan][self._scans.back[scan]][::2])
+        ends = self._scans.ends[scan][self._scans.back[scan]]
+        chosen, scores = self._follower.lattice_scores(ends[::2])
         best = np.argpartition(-scores, min(BEST, len(scores)) - 1)[:BEST]
         best = best[np.lexsort([best, -scores[best]])]
         poses, candidates = self._follower.lattice_poses(chosen[best]), []
@@ -480,8 +486,8 @@ class _Springs:
     """Of each place on the map: half the squared distance to the nearest surface, its slope, and the normal.
 
     The normal is smoothed, as the outer product of the slopes of q with itself, so that there is one on
-    the surface too. Of a map that is larger than a tile only those tiles are made in which a beam ends:
-    24 bytes a cell.
+    the surface too. Of a map that is larger than a tile only those tiles are made in which a beam
+    ends: 24 bytes a cell.
     """
 
     def __init__(self, background):
@@ -491,7 +497,7 @@ class _Springs:
             (background.origin, background.resolution),
         )
         self._shape = np.add(self._occupancy.shape, 2 * self._border)
-        self._tiles = -(-(self._shape - 1) // TILE)  # the last row and column belong to the tile before
+        self._tiles = -(-(self._shape - 1) // TILE)  # each has a row and column of the next
         self._sides = np.minimum(self._shape, TILE + 1)
         self._made = np.zeros(np.prod(self._tiles), bool)
         self._table = np.empty((len(self._made) * np.prod(self._sides), 6), np.float32)
@@ -532,11 +538,11 @@ class _Springs:
         self._made[number] = True
 
     def _window(self, low, high):
-        """Occupancy from one row and column up to others, 0 round the map and where it is not known."""
-        shape = self._occupancy.shape
-        first, last = ((each - self._border).clip(0, shape) for each in (low, high))
+        """Occupancy from one row and column up to others, 0 round the map and where unknown."""
+        low, high = low - self._border, high - self._border
+        first, last = (each.clip(0, self._occupancy.shape) for each in (low, high))
         inside = np.nan_to_num(self._occupancy[first[0] : last[0], first[1] : last[1]])
-        return np.pad(inside, np.column_stack([first + self._border - low, high - self._border - last]))
+        return np.pad(inside, np.column_stack([first - low, high - last]))
 
 
 def _springs_of(occupancy, resolution):

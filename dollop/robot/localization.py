@@ -22,7 +22,7 @@ from math import pi
 import numpy as np
 import scipy
 
-from dollop.checks import checked_array
+from dollop.checks import checked_array, checked_generator
 from dollop.gridmap import covered_cells, distances_to, in_cells
 from dollop.pose import rotation
 from dollop.robot.avoidance import FREE_BELOW
@@ -43,8 +43,9 @@ BEAM_STEP = 3
 LATTICE, HEADINGS = 0.15, 72
 """Distance in m between the poses of the lattice, and how many headings each place has."""
 MOST_POSES = 2_000_000
-"""Poses of the lattice that are kept, the best of all: as many as there are on 600 m^2 of floor. A worse one
-would hardly be drawn, and each takes 50 bytes for a moment: of a hall of 200 m there are a hundred million."""
+"""Poses of the lattice that are kept, the best of all: as many as there are on 600 m^2 of floor. A
+worse one would hardly be drawn, and each takes 50 bytes for a moment: in a hall of 200 m there are
+a hundred million."""
 BLOCK = 1 << 18
 """Numbers that are looked up at once for the lattice."""
 TRACKING, SEARCHING = 250, 3000
@@ -67,9 +68,9 @@ class MonteCarloLocalizer:
 
     From "Probabilistic Robotics" (2005) and Lenser and Veloso (2000), see the top of this module.
 
-    Memory: 12 bytes a cell of the map to follow a robot, and 40 for a moment; to search for one 30 more,
-    and those of the map's border where beams end beyond it. The best 2 million poses of the lattice are
-    looked at. So a map of 200 m x 200 m at 5 cm takes less than 1 GiB, whether a pose is told or not.
+    Memory: 16 bytes a cell of the map to follow a robot, and 40 to begin; 70 to search for one, and
+    no more than 140 however long its beams are. The best 2 million poses of the lattice are kept.
+    So 200 m x 200 m at 5 cm take less than 1 GiB, and the search a quarter of a minute.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ class MonteCarloLocalizer:
     """
 
     def __init__(self, background, angles, environment=None, pose=None, laser_offset=0.0, seed=0):
-        self._rng = np.random.default_rng(seed)
+        self._rng = checked_generator("seed", seed)
         self._bearings = np.asarray(angles, dtype=float)[::BEAM_STEP]
         self._laser_offset = laser_offset
         blocked, frame = background.occupied, (background.origin, background.resolution)
@@ -214,7 +215,7 @@ class MonteCarloLocalizer:
         scores : (N,) float array
         """
         places, headings = self._lattice, np.arange(HEADINGS) * (2 * pi / HEADINGS)
-        field = self._field_of(WIDE_SIGMA)  # not kept: a robot that knows where it is does not need it
+        field = self._field_of(WIDE_SIGMA)  # not kept: it is for the lost
         chosen, scores, least = np.zeros(0, np.intp), np.zeros(0, np.float32), -np.inf
         for k, found in enumerate(field.lattice_log_likelihoods(places, headings, ends)):
             better = np.flatnonzero(found >= least)
@@ -245,7 +246,8 @@ class MonteCarloLocalizer:
     def _draw(self, ends):
         """Particles (N, 3) from a scan: lattice poses by their likelihood, spread over meshes."""
         chosen, scores = self.lattice_scores(ends[::2])
-        chosen = chosen[self._rng.choice(len(scores), SEARCHING, p=softmax(2 * INDEPENDENT * scores))]
+        weights = softmax(2 * INDEPENDENT * scores)
+        chosen = chosen[self._rng.choice(len(scores), SEARCHING, p=weights)]
         mesh = [LATTICE, LATTICE, 2 * pi / HEADINGS]
         return self.lattice_poses(chosen) + self._rng.uniform(-0.5, 0.5, (SEARCHING, 3)) * mesh
 
@@ -273,8 +275,9 @@ class LikelihoodField:
 
     def __init__(self, distances, sigma, origin, resolution):
         self.reach = resolution * np.hypot(*distances.shape)  # no longer beam ends on the map
-        self._border = int(np.ceil(self.reach / resolution)) + 2  # none ends beyond: cells are counted from there
-        table = np.zeros(np.add(distances.shape, 2), np.float32)  # and of it one cell is enough: all are alike
+        # Cells are counted from where no beam ends; of that border, all alike, one cell is kept.
+        self._border = int(np.ceil(self.reach / resolution)) + 2
+        table = np.zeros(np.add(distances.shape, 2), np.float32)
         for row, away in zip(table[1:-1], distances, strict=True):
             row[1:-1] = np.exp(-0.5 * (away / sigma) ** 2)
         self.shape, self.table = table.shape, table.ravel()
@@ -299,12 +302,14 @@ class LikelihoodField:
         An iterator over (N,) float arrays. The border is as wide as the beams are long.
         """
         ends, most = self.within_reach(ends), np.array(self.shape) - 1
-        border = np.minimum(np.ceil(np.hypot(*ends.T).max(initial=0) / self.resolution) + 1, most).astype(int)
+        longest = np.ceil(np.hypot(*ends.T).max(initial=0) / self.resolution) + 1
+        border = np.minimum(longest, most).astype(int)
         beyond = {"mode": "constant", "constant_values": self.log_table[0]}
         table = np.pad(self.log_table.reshape(self.shape), border[:, None], **beyond)
         columns, table = table.shape[1], table.ravel()
-        here = self._rows_and_columns(np.column_stack([places, np.zeros(len(places))]), np.zeros((1, 2)))
-        here = (here[0] + border[0]) * columns + here[1] + border[1]
+        poses = np.column_stack([places, np.zeros(len(places))])
+        row, column = self._rows_and_columns(poses, np.zeros((1, 2)))
+        here = (row + border[0]) * columns + column + border[1]
         for heading in headings:
             there = np.rint(ends @ rotation(heading).T / self.resolution)
             column, row = there.astype(np.int32).T

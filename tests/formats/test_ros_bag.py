@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dollop.formats import bag_bounds
+from dollop.formats import ros_bag_bounds
 from dollop.formats.files import FormatError
 from dollop.formats.logs import read_log, read_odometry
 from dollop.gridmap import OccupancyGrid
@@ -439,9 +439,9 @@ def test_a_packed_chunk_has_bounds(tmp_path, monkeypatch):
 
     from rosbags.rosbag1.reader import Chunk
 
-    packed = bz2.compress(bytes(bag_bounds.MAX_CHUNK + 1))
+    packed = bz2.compress(bytes(ros_bag_bounds.MAX_CHUNK + 1))
     reader = SimpleNamespace(chunks={0: Chunk(len(packed), 0, bz2.decompress)})
-    bag_bounds.bound_chunks([reader])
+    ros_bag_bounds.bound_chunks([reader])
     assert len(packed) < 1000
     with pytest.raises(ValueError, match="a chunk unpacks to more than 67108864 bytes"):
         reader.chunks[0].decompressor(packed)
@@ -465,7 +465,7 @@ def test_packed_bags_are_read(tmp_path, monkeypatch, version):
             bag.write(connection, i, bytes(serialize(message, SCAN)))
     path = tmp_path / ("a.bag" if version == "1" else "a")
     assert len(read_log(path)) == 3
-    monkeypatch.setattr(bag_bounds, "MAX_CHUNK", 100)
+    monkeypatch.setattr(ros_bag_bounds, "MAX_CHUNK", 100)
     with pytest.raises(FormatError, match="a chunk (of .* bytes is larger than|unpacks to more than) 100"):
         read_log(path)
 

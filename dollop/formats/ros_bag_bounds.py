@@ -7,10 +7,10 @@ import bz2
 import struct
 from collections import deque
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 from dollop.formats.files import FormatError, from_file, read_bytes
-from dollop.formats.yaml_nodes import plain_nodes
 
 __all__ = ["MAX_CHUNK", "bound_chunks", "check_bag"]
 
@@ -36,7 +36,7 @@ def check_bag(path):
     FormatError
         Where a record runs past the end of the file, a chunk of an mcap file unpacks to more than
         64 MiB, or the metadata are larger than 128 KiB, have more than 10,000 nodes, or are refused
-        by `dollop.formats.yaml_nodes.plain_nodes`.
+        by `dollop.formats.plain_yaml.plain_nodes`.
     """
     path = Path(path)
     if path.is_dir():
@@ -60,12 +60,8 @@ def bound_chunks(readers):
     readers : sequence of rosbags' readers
         Open; they are changed.
     """
-    import lz4.frame
-
-    kinds = {
-        bz2.decompress: bz2.BZ2Decompressor,
-        lz4.frame.decompress: lz4.frame.LZ4FrameDecompressor,
-    }
+    lz4 = import_module("lz4.frame")  # which rosbags brings
+    kinds = {bz2.decompress: bz2.BZ2Decompressor, lz4.decompress: lz4.LZ4FrameDecompressor}
     for reader in readers:
         chunks = getattr(reader, "chunks", {})
         for place, chunk in chunks.items():
@@ -83,6 +79,8 @@ def _unpacked(kind, packed):
 
 
 def _check_metadata(path):
+    from dollop.formats.plain_yaml import plain_nodes
+
     from_file(path, deque, plain_nodes(read_bytes(path, MAX_METADATA), MAX_NODES), 0)
 
 
@@ -125,11 +123,8 @@ def _check_chunk(path, chunk):
 
 
 def _mcap_kinds():
-    """Decompressors by the name that mcap has for them."""
-    import lz4.frame
+    """Decompressors by the name that mcap has for them; rosbags brings their modules."""
+    from rosbags.rosbag2.storage_mcap import zstd
 
-    try:
-        from compression import zstd
-    except ImportError:  # before Python 3.14
-        from backports import zstd
-    return {b"lz4": lz4.frame.LZ4FrameDecompressor, b"zstd": zstd.ZstdDecompressor}
+    lz4 = import_module("lz4.frame")
+    return {b"lz4": lz4.LZ4FrameDecompressor, b"zstd": zstd.ZstdDecompressor}

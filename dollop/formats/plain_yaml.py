@@ -1,6 +1,8 @@
-"""YAML read without making anything of it: the events of its nodes, within bounds."""
+"""YAML without its surprises: its nodes as they stand there, within bounds, and nothing made of them."""
 
 from itertools import accumulate
+
+import yaml
 
 __all__ = ["plain_nodes"]
 
@@ -36,10 +38,10 @@ def plain_nodes(content, most):
     Traceback (most recent call last):
     ValueError: there must be no anchors, aliases and tags, got one on line 1
     """
-    import yaml  # only now: it takes long to load
-
     brackets = (1 if byte in b"[{" else -1 for byte in content if byte in b"[{]}")
-    if max(accumulate(brackets), default=0) > DEEPEST:
+    # Never below zero: what is closed in a comment makes no room for what is opened after it.
+    depths = accumulate(brackets, lambda depth, step: max(depth + step, 0), initial=0)
+    if max(depths) > DEEPEST:
         raise ValueError(f"brackets must be at most {DEEPEST} deep within each other")
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     count = 0
