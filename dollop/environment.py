@@ -365,7 +365,8 @@ def _springs(corners):
     """Spring constants (C, C) and differences omega_n - omega_m (C, C, 2) between corners."""
     corners = checked_positions("corners", corners)
     if len(corners) > MOST_CORNERS:
-        raise ValueError(f"springs must be between at most {MOST_CORNERS} corners, got {len(corners)}")
+        rule = f"springs must be between at most {MOST_CORNERS} corners"
+        raise ValueError(f"{rule}, got {len(corners)}")
     differences = corners - corners[:, None]
     squares = np.einsum("mnd,mnd->mn", differences, differences)
     np.fill_diagonal(squares, np.inf)

@@ -308,7 +308,8 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     checked_record("environment_j", environment_j, Environment)
     most = max(len(environment_i), len(environment_j))
     if most > MOST_OBJECTS:
-        raise ValueError(f"environments to match must have at most {MOST_OBJECTS} objects, got {most}")
+        rule = f"environments to match must have at most {MOST_OBJECTS} objects"
+        raise ValueError(f"{rule}, got {most}")
     if method == "robust":
         return _match_robustly(environment_i, environment_j, moved)
     counts = f"{len(environment_i)} and {len(environment_j)}"

@@ -708,6 +708,7 @@ def observe_as_paper(
     """
     checked_record("log", log, LaserLog)
     checked_record("background", background, OccupancyGrid)
+    checked_number("the background's resolution", background.resolution, *RESOLUTIONS)
     checked_number("background_radius", background_radius, 1 / FARTHEST)
     checked_number("min_area", min_area, 0)
     checked_number("stride", stride, 0)

@@ -147,9 +147,14 @@ def _named_beside(tree, path):
     return {beside[name] for name in named & set(beside) if beside[name].is_file()}
 
 
+@cache
 def _imported(name, path):
     """Modules of this library that a module imports."""
-    tree = _tree(path)
+    return set(_imports(name, path, _tree(path)))
+
+
+def _imports(name, path, tree):
+    """The same, one after the other."""
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):

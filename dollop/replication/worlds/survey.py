@@ -7,6 +7,7 @@ the worst worlds; and the tables in the report.
 """
 
 from collections import Counter
+from math import isfinite
 from pathlib import Path
 
 import joblib
@@ -26,6 +27,8 @@ from dollop.replication.worlds.draw import KINDS, draw
 __all__ = ["FIRST", "command", "read_table", "summary"]
 
 SEEDS, QUICK_SEEDS = 300, 11
+NUMBERS = COLUMNS[COLUMNS.index("draws") :]
+"""Columns of the table that hold numbers, or nothing."""
 WORST = 12
 """How many worlds the sheet of pictures shows."""
 FIRST = "worlds_first.csv"
@@ -80,8 +83,13 @@ def ledger_at(path):
 
 
 def is_sound(row):
-    """Whether a line is one that a study writes."""
-    return row["draws"].isdecimal() if is_done(row) else row["told"].startswith(NOT_DONE)
+    """Whether a line is one that a study writes: with an outcome and numbers, or set aside."""
+    if not is_done(row):
+        return row["told"].startswith(NOT_DONE)
+    try:
+        return all(isfinite(float(row[name] or 0)) for name in NUMBERS) and row["draws"].isdecimal()
+    except ValueError:
+        return False
 
 
 def is_done(row):
@@ -150,7 +158,14 @@ def summary(table):
         "kinds": for each kind, and for "all", worlds, each outcome, and how many of the silently wrong
         ones were refused later; "causes": how many worlds had each, and how many of all had it as the
         first; "refusals": how many at each step; "draws": the mean number of draws of a world.
+
+    Raises
+    ------
+    ValueError
+        If the table has no row.
     """
+    if not len(table):
+        raise ValueError("a summary needs a world, got a table of none")
     groups = {kind: table[table.kind == kind] for kind in KINDS} | {"all": table}
     return {
         "seeds": [int(table.index.min()), int(table.index.max())],
