@@ -85,12 +85,18 @@ def _check_metadata(path):
 
 
 def _check_records(path, stream, size):
-    """Records of a ROS 1 bag: head and content, each after its length."""
+    """Records of a ROS 1 bag: head and content, each after its length; the index is where one begins."""
+    places = {size}
     while (place := stream.tell()) < size:
+        places.add(place)
         for _ in range(2):
             length = int.from_bytes(stream.read(4), "little")
             if stream.seek(length, 1) > size:
                 raise FormatError(f"a record at byte {place} runs past the end of the file", path)
+    stream.seek(len(BAG))
+    _, _, index = stream.read(200).partition(b"index_pos=")
+    if int.from_bytes(index[:8], "little") not in places:
+        raise FormatError("the index must be where a record begins", path)
 
 
 def _check_mcap(path, stream, size):

@@ -425,6 +425,9 @@ def test_records_that_run_past_the_end_are_refused(tmp_path):
     path.write_bytes(content[:13] + b"\xff\xff\xff\x7f" + content[17:])
     with pytest.raises(FormatError, match="a record at byte 13 runs past the end of the file"):
         read_log(path)
+    path.write_bytes(content.replace(b"index_pos=", b"index_pos=\1", 1))
+    with pytest.raises(FormatError, match="the index must be where a record begins|runs past the end"):
+        read_log(path)
     path = next(write_bag(tmp_path / "b", "mcap", {"/scan": scans_of}).glob("*.mcap"))
     content = path.read_bytes()
     path.write_bytes(content[:9] + b"\xff" * 6 + content[15:])
