@@ -30,7 +30,7 @@ def test_four_studies_in_one_folder_share_the_work(tmp_path):
     assert [study.wait() for study in studies] == [0, 0, 0, 0]
     assert done_in(tmp_path) == (set(jobs_of(range(30))), 0)
     assert marks_in(tmp_path) == 90
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["marks", "results.csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["marks", "marks.txt", "results.csv"]
 
 
 def test_rows_of_other_code_and_damaged_ones_are_made_anew(tmp_path, capsys):
