@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from collections import Counter, deque
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from functools import partial
 
@@ -259,7 +259,12 @@ class _Lane:
             jobs, self.jobs = self.jobs[:n], self.jobs[n:]
         self.executor = self.executor or self.open()
         self.under_way, self.began = jobs, time.monotonic()
-        self.future = self.executor.submit(work, jobs)
+        try:
+            self.future = self.executor.submit(work, jobs)
+        except BrokenExecutor:  # the worker died while it had nothing to do
+            self.close(self.kill)
+            self.executor = self.open()
+            self.future = self.executor.submit(work, jobs)
 
     def late(self):
         """Whether the jobs have taken longer than any may."""
