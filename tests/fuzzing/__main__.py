@@ -13,8 +13,9 @@ from pathlib import Path
 
 import calls
 import kinds
-from dollop.checks import told
 from watch import bounded, watch_all, watched
+
+from dollop.checks import told
 
 CALLS = calls.NUMBERS, calls.RECORDS
 VERDICTS = "accepted", "refused", "failed"

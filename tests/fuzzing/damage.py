@@ -8,15 +8,19 @@ import zlib
 from functools import partial
 
 NUMBERS = (
-    b"nan", b"-nan", b"inf", b"-inf", b"Infinity", b"1e308", b"-1e308", b"1e309", b"1.7976931348623157e308", b"5e-324",
-    b"1e155", b"1e17", b"1e10", b"1e9", b"1e6", b"1e-9", b"-1", b"-0", b"0", b"-0.0", b"1", b"2", b"3", b"1_0", b"1.9",
+    b"nan", b"-nan", b"inf", b"-inf", b"Infinity", b"1e308", b"-1e308", b"1e309", b"1.7976931348623157e308",
+    b"5e-324",
+    b"1e155", b"1e17", b"1e10", b"1e9", b"1e6", b"1e-9", b"-1", b"-0", b"0", b"-0.0", b"1", b"2", b"3", b"1_0",
+    b"1.9",
     b"0x10", b"0b1", b"0o7", b"1" + b"0" * 400, b"-" + b"9" * 400, b"9223372036854775807", b"9223372036854775808",
     b"4294967296", b"2147483648", b"-2147483649", b"65536", b"1e400", b"+1", b"1.", b".5", b"1e", b"1d5", b"1,5",
     b"1j", b"True", b"9" * 5000, b"0" * 5000 + b"1", b"0." + b"3" * 3000,
 )  # fmt: skip
 WORDS = (
-    b"", b"abc", b"None", b"null", b"true", b"yes", b"NULL", b'""', b"''", b"\xff\xfe", b"\xc3\x28", b"\0", b"\xef\xbb\xbf",
-    "\u0661\u0662".encode(), "\uff11".encode(), "\u2460".encode(), "\u00bd".encode(), "\u2028".encode(), b"x" * 100_000,
+    b"", b"abc", b"None", b"null", b"true", b"yes", b"NULL", b'""', b"''", b"\xff\xfe", b"\xc3\x28", b"\0",
+    b"\xef\xbb\xbf",
+    "\u0661\u0662".encode(), "\uff11".encode(), "\u2460".encode(), "\u00bd".encode(), "\u2028".encode(),
+    b"x" * 100_000,
     b"%s%n", b"{0}", b"\x1b[31m", b"\r", b"\x0b", b"\x85", b"../../etc", b"a\nb", b"=1+1", b"\\", b"#", b";",
 )  # fmt: skip
 DEEP = 100_000
@@ -196,9 +200,21 @@ def nodes_of(tree, most=4000):
     return found
 
 
+def nearly(rng, value):
+    """A number that is a little different, or a list of numbers that are: such files may well be accepted."""
+    if isinstance(value, bool) or not isinstance(value, int | float | list):
+        return value
+    if isinstance(value, list):
+        change = pick(rng, (1e-7, 1e-3, 0.1, 3.0, 1e4))
+        return [each + change if isinstance(each, float) else each for each in value]
+    return pick(rng, (value + 1e-9, value * 1.001, value + 0.1, value + 1, value - 1, value * 2, value * 10, -value))
+
+
 def hostile_value(rng, value, raw):
     """Something else in the place of a value of JSON; `raw` keeps what JSON's own writer would not write."""
-    kind = int(rng.integers(12))
+    kind = int(rng.integers(16))
+    if kind > 11:
+        return nearly(rng, value)
     if kind == 0:
         return raw(pick(rng, NUMBERS + (b"NaN", b"-Infinity", b"1" * 4301)))
     if kind == 1:
@@ -224,8 +240,10 @@ def hostile_value(rng, value, raw):
         return pick(rng, (0, 1, "true", None, not value, [value]))
     if isinstance(value, int | float):
         return pick(rng, (
-            -value, value * 1e308, value * 1e155, value * 1e9, value + 1, value - 1, value * 1.5, value + 1e-3, str(value),
-            bool(value), raw(b"1" + b"0" * 400), raw(b"NaN"), 10**30, 2**31, 2**63, 2**64, -(2**63) - 1, value * 1000, 0, 1e9, 1e6,
+            -value, value * 1e308, value * 1e155, value * 1e9, value + 1, value - 1, value * 1.5, value + 1e-3,
+            str(value),
+            bool(value), raw(b"1" + b"0" * 400), raw(b"NaN"), 10**30, 2**31, 2**63, 2**64, -(2**63) - 1,
+            value * 1000, 0, 1e9, 1e6,
         ))  # fmt: skip
     if isinstance(value, str):
         return pick(
@@ -288,15 +306,24 @@ LAUGHS = b"a: &a [x,x,x,x,x,x,x,x,x]\n" + b"".join(
     b"%c: &%c [%s]\n" % (98 + i, 98 + i, b",".join([b"*%c" % (97 + i)] * 9)) for i in range(9)
 )
 YAML_VALUES = (
-    b"!!bool foo", b"!!int abc", b"!!float x", b"!!python/object/apply:os.getcwd []", b"!!python/name:os.system", b"!!binary x",
-    b"!!timestamp 1", b"!!set {a}", b"!!omap [a: 1]", b"!!null x", b"!!str 5", b"!<tag:x> 1", b"!x 1", b"&a [*a]", b"*a", b"&a 1",
-    b"<<", b"[<<: 1]", b"2001-99-99", b"2001-01-01", b"2001-01-01 25:61:61", b"1:30", b"1:99:99.5", b"190:20:30", b"0o17", b"017", b"0b1",
-    b"0x" + b"f" * 300, b".inf", b"-.inf", b".nan", b".Inf", b"1e3", b"1.0e+3", b"1_0", b"1__0.5", b"~", b"yes", b"no", b"on", b"off", b"true",
-    b"|\n  text", b">\n  text", b"[1, 2", b"{a: b", b'"\\x41"', b'"\\U00110000"', b"'", b'"', b"%", b"@", b"`", b"- 1", b"? x", b"---", b"...",
-    b"[" * 1000 + b"]" * 1000, b"[" * 3000, b"{" * 500, b"[[0, 0], 0, 0]", b"[0, 0]", b"[0, 0, 0, 0]", b"[0, 0, 1]", b"[.nan, 0, 0]", b"[1.0e+308, 0, 0]",
-    b"[true, 0, 0]", b'["0", "0", "0"]', b"[1e3, 0, 0]", b"[1_0, 0, 0]", b"[0x10, 0, 0]", b"{0: 0}", b"{[a]: b}", b"{{}: 1}", b"{a: 1, a: 2}",
-    b"/dev/zero", b"/dev/stdin", b"/proc/self/mem", b".", b"..", b"../x.pgm", b"x" * 5000 + b".pgm", b'"a\\0b.pgm"', b"map.yaml", b"http://x/y.pgm",
-    b"trinary", b"scale", b"raw", b"Trinary", b"0.05", b"0", b"1", b"-1", b"1.0e-300", b"1.0e+300", b"1000000", b"0.00001", b"100",
+    b"!!bool foo", b"!!int abc", b"!!float x", b"!!python/object/apply:os.getcwd []", b"!!python/name:os.system",
+    b"!!binary x",
+    b"!!timestamp 1", b"!!set {a}", b"!!omap [a: 1]", b"!!null x", b"!!str 5", b"!<tag:x> 1", b"!x 1", b"&a [*a]",
+    b"*a", b"&a 1",
+    b"<<", b"[<<: 1]", b"2001-99-99", b"2001-01-01", b"2001-01-01 25:61:61", b"1:30", b"1:99:99.5", b"190:20:30",
+    b"0o17", b"017", b"0b1",
+    b"0x" + b"f" * 300, b".inf", b"-.inf", b".nan", b".Inf", b"1e3", b"1.0e+3", b"1_0", b"1__0.5", b"~", b"yes",
+    b"no", b"on", b"off", b"true",
+    b"|\n  text", b">\n  text", b"[1, 2", b"{a: b", b'"\\x41"', b'"\\U00110000"', b"'", b'"', b"%", b"@", b"`",
+    b"- 1", b"? x", b"---", b"...",
+    b"[" * 1000 + b"]" * 1000, b"[" * 3000, b"{" * 500, b"[[0, 0], 0, 0]", b"[0, 0]", b"[0, 0, 0, 0]", b"[0, 0, 1]",
+    b"[.nan, 0, 0]", b"[1.0e+308, 0, 0]",
+    b"[true, 0, 0]", b'["0", "0", "0"]', b"[1e3, 0, 0]", b"[1_0, 0, 0]", b"[0x10, 0, 0]", b"{0: 0}", b"{[a]: b}",
+    b"{{}: 1}", b"{a: 1, a: 2}",
+    b"/dev/zero", b"/dev/stdin", b"/proc/self/mem", b".", b"..", b"../x.pgm", b"x" * 5000 + b".pgm", b'"a\\0b.pgm"',
+    b"map.yaml", b"http://x/y.pgm",
+    b"trinary", b"scale", b"raw", b"Trinary", b"0.05", b"0", b"1", b"-1", b"1.0e-300", b"1.0e+300", b"1000000",
+    b"0.00001", b"100",
 )  # fmt: skip
 
 
@@ -341,8 +368,10 @@ def change_yaml(content, rng):
 EXTREMES = {
     1: (0, 1, 127, 128, 255),
     2: (0, 1, 0x7FFF, 0x8000, 0xFFFF),
-    4: (0, 1, 2, 1000, 65536, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0xFFFFFFF0, 0x10000000, 0x7F800000, 0x7FC00000, 0x7F7FFFFF, 0x00000001),
-    8: (0, 1, 2**31, 2**32, 2**62, 2**63 - 1, 2**63, 2**64 - 1, 0x7FF0000000000000, 0x7FF8000000000000, 0x7FE1CCF385EBC8A0),
+    4: (0, 1, 2, 1000, 65536, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0xFFFFFFF0, 0x10000000, 0x7F800000, 0x7FC00000,
+    0x7F7FFFFF, 0x00000001),
+    8: (0, 1, 2**31, 2**32, 2**62, 2**63 - 1, 2**63, 2**64 - 1, 0x7FF0000000000000, 0x7FF8000000000000,
+    0x7FE1CCF385EBC8A0),
 }  # fmt: skip
 """Sizes, counts and numbers (inf, NaN, 1e308 among them) by the bytes that they take."""
 

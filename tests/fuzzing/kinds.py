@@ -15,8 +15,20 @@ from damage import damaged, pick
 from PIL import Image
 from watch import Wrong, pushed
 
-from dollop import Demonstration, Environment, LaserLog, OccupancyGrid, Task, Unicycle, learn, localise, observe
-from dollop import perform, read_log, write_log
+from dollop import (
+    Demonstration,
+    Environment,
+    LaserLog,
+    OccupancyGrid,
+    Task,
+    Unicycle,
+    learn,
+    localise,
+    observe,
+    perform,
+    read_log,
+    write_log,
+)
 from dollop.environment import Seen
 from dollop.formats import read_odometry
 from dollop.lab.outlines import meeting
@@ -199,10 +211,8 @@ def ros_maps(suffix):
 def as_png(found, mode):
     """The same map with a PNG of some mode."""
     picture, stream = Image.open(io.BytesIO(found["a.pgm"])), io.BytesIO()
-    if mode == "I;16":
-        picture = Image.fromarray(np.asarray(picture).astype(np.uint16) * 257)
-    else:
-        picture = picture.convert(mode)
+    grey = np.asarray(picture)
+    picture = Image.fromarray(grey.astype(np.uint16) * 257) if mode == "I;16" else picture.convert(mode)
     picture.save(stream, "PNG")
     return {"a.yaml": found["a.yaml"].replace(b"a.pgm", b"a.png"), "a.png": stream.getvalue()}
 

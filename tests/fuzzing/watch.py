@@ -105,18 +105,19 @@ def pushed(step, *arguments, **options):
         return None
 
 
-def checked_warnings(told):
-    """The outcome of warnings that do not come from the library's own words; nothing if all do."""
-    for each in told:
-        own = issubclass(each.category, UserWarning) and Path(each.filename).is_relative_to(HERE)
-        what = "" if own else f"{each.category.__name__} from the depth"
-        what = what or fault_of_text(str(each.message))
-        if what:
-            place = Path(each.filename)
-            place = place.relative_to(LIBRARY) if place.is_relative_to(LIBRARY) else place.name
-            message = str(each.message)
-            return Outcome("failed", f"{what} in {place}", f"{place}:{each.lineno}: {message[:2000]}")
-    return None
+class Heard:
+    """Warnings of a piece of work, each with the innermost place in the library that it came from."""
+
+    def __init__(self):
+        self.wrong = None
+
+    def __call__(self, message, category, filename, lineno, *_):
+        own = issubclass(category, UserWarning) and Path(filename).is_relative_to(HERE)
+        what = fault_of_text(str(message)) if own else f"{category.__name__} from the depth"
+        if what and not self.wrong:
+            frames = list(traceback.walk_stack(None))[::-1]
+            told = f"{filename}:{lineno}: {str(message)[:2000]}"
+            self.wrong = Outcome("failed", f"{what} in {place_of(frames)}", told)
 
 
 def ring(*_):
@@ -130,8 +131,10 @@ def watched(work, *arguments):
     Who calls it must be in the main thread; memory is bounded by `bounded`.
     """
     signal.signal(signal.SIGALRM, ring)
-    with warnings.catch_warnings(record=True) as told:
+    heard = Heard()
+    with warnings.catch_warnings():
         warnings.simplefilter("always")
+        warnings.showwarning = heard
         try:
             signal.setitimer(signal.ITIMER_REAL, SECONDS)
             work(*arguments)
@@ -145,7 +148,7 @@ def watched(work, *arguments):
             outcome = failed(error, what) if what else Outcome("refused", "", str(error))
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
-    return outcome if outcome.verdict == "failed" else checked_warnings(told) or outcome
+    return outcome if outcome.verdict == "failed" else heard.wrong or outcome
 
 
 # ---- many
@@ -162,7 +165,7 @@ def do_some(answer, work, pieces, extra):
     """In a process of its own: what comes of each piece, told one by one."""
     bounded(extra)
     for piece in pieces:
-        answer.send(watched(work, piece))
+        answer.send((piece, watched(work, piece)))
     answer.close()
 
 
@@ -178,13 +181,13 @@ class Worker:
         answer.close()
 
     def outcome(self):
-        """The next outcome, and its piece; None as outcome if the process has ended."""
+        """The next piece and its outcome; None for both if the process has ended."""
         try:
-            found = self.answers.recv()
+            piece, found = self.answers.recv()
         except EOFError:
             return None, None
-        self.heard, self.done = time.monotonic(), self.done + 1
-        return self.pieces[self.done - 1], found
+        self.heard, self.done = time.monotonic(), self.pieces.index(piece, self.done) + 1
+        return piece, found
 
     def end(self):
         """Stop the process if it has not stopped, and tell what was under way, with the reason."""

@@ -1,0 +1,53 @@
+"""Whatever is damaged is refused in words, or right: a short run; `make fuzz` has a longer one."""
+
+import pytest
+
+pytest.importorskip("resource", reason="processes are forked and bounded as Unix can")
+
+import calls
+import kinds
+from watch import watch_all
+
+SEED, FILES, CALLS = 0, 130, 400
+"""How many files of each kind, and calls of each."""
+
+
+def failures(work, pieces):
+    """What failed, in words, each cause once."""
+    found = {}
+    for piece, outcome in watch_all(work, pieces):
+        if outcome.verdict == "failed":
+            found.setdefault(outcome.cause, f"{piece}: {outcome.cause}\n{outcome.told}")
+    return "\n\n".join(found.values())
+
+
+@pytest.mark.parametrize("name", kinds.KINDS)
+def test_damaged_files_are_refused_in_words_or_right(name):
+    """Damaged files are read, and used where they are accepted.
+
+    No error but the library's own, of a line; no warning from the depth; an end within 10 s and 1 GiB; finite results.
+    """
+    if name not in kinds.there():
+        pytest.skip(f"{kinds.KINDS[name].needs} is not installed")
+    assert not failures(kinds.one, [(name, SEED, index) for index in range(FILES)])
+
+
+@pytest.mark.parametrize("kind", [calls.NUMBERS, calls.RECORDS])
+def test_hostile_calls_are_refused_in_words_or_right(kind):
+    """The same of the public names, with one argument or two that nobody should give."""
+    assert not failures(calls.one_call, [(kind, SEED, index) for index in range(CALLS)])
+
+
+@pytest.mark.parametrize("name", kinds.KINDS)
+def test_valid_files_are_accepted(name):
+    """What is damaged is right before, and comes through all that is done with it."""
+    if name not in kinds.there():
+        pytest.skip(f"{kinds.KINDS[name].needs} is not installed")
+    assert not failures(lambda files: kinds.one((name, SEED, 0), files), kinds.seeds_of(name))
+
+
+def test_valid_calls_are_accepted():
+    """And so are the arguments of which one is replaced."""
+    for name, call in calls.calls().items():
+        if "path" not in call.arguments:
+            calls.check_result(call.function(**call.arguments), call.may, name)
