@@ -6,6 +6,7 @@ import re
 import struct
 import zlib
 from functools import partial
+from hashlib import sha256
 
 NUMBERS = (
     b"nan", b"-nan", b"inf", b"-inf", b"Infinity", b"1e308", b"-1e308", b"1e309", b"1.7976931348623157e308",
@@ -300,6 +301,21 @@ def change_node(holder, rng, raw):
         where[key] = hostile_value(rng, where[key], raw)
 
 
+# ---- of the study's tables
+
+
+def change_row(content, rng):
+    """A line of a table whose last column is a checksum is damaged, and the checksum is right again."""
+    lines = content.split(b"\n")
+    if not lines[0].endswith(b",check"):
+        return pick(rng, TEXT)(content, rng)
+    for _ in range(pick(rng, (1, 1, 3))):
+        i = int(rng.integers(1, len(lines))) if len(lines) > 1 else 0
+        text = pick(rng, (*TEXT, *BYTES))(lines[i].rpartition(b",")[0], rng).replace(b"\n", b" ")
+        lines[i] = text + b"," + sha256(text).hexdigest()[:12].encode()
+    return b"\n".join(lines)
+
+
 # ---- of YAML
 
 LAUGHS = b"a: &a [x,x,x,x,x,x,x,x,x]\n" + b"".join(
@@ -526,7 +542,7 @@ def one_of(*damages):
 
 BY_SUFFIX = {
     ".log": one_of(*TEXT, *TEXT, *BYTES),
-    ".csv": one_of(*TEXT, *TEXT, *BYTES),
+    ".csv": one_of(*TEXT, *TEXT, *BYTES, *[change_row] * 20),
     ".json": one_of(*[change_tree] * 30, *TEXT, *BYTES),
     ".yaml": one_of(*[change_yaml] * 20, *TEXT, *BYTES[:6]),
     ".map": one_of(*BINARY, replace_word),

@@ -8,6 +8,7 @@ import dis
 import multiprocessing
 import resource
 import signal
+import sys
 import time
 import traceback
 import warnings
@@ -115,7 +116,7 @@ class Heard:
         own = issubclass(category, UserWarning) and Path(filename).is_relative_to(HERE)
         what = fault_of_text(str(message)) if own else f"{category.__name__} from the depth"
         if what and not self.wrong:
-            frames = list(traceback.walk_stack(None))[::-1]
+            frames = list(traceback.walk_stack(sys._getframe()))[::-1]
             told = f"{filename}:{lineno}: {str(message)[:2000]}"
             self.wrong = Outcome("failed", f"{what} in {place_of(frames)}", told)
 
