@@ -19,8 +19,11 @@ def stored(version):
     return store
 
 
-def written(version, messages):
-    """Files of a bag, {name: content}, of what a function makes of a store: (topic, type, message) in order."""
+def written(version, messages, spoiled=bytes):
+    """Files of a bag, {name: content}, of what a function makes of a store: (topic, type, message) in order.
+
+    What a message is as bytes may be spoiled; the bag round it is right.
+    """
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
@@ -35,7 +38,7 @@ def written(version, messages):
             for i, (topic, kind, message) in enumerate(messages(store)):
                 if topic not in connections:
                     connections[topic] = bag.add_connection(topic, kind, typestore=store)
-                bag.write(connections[topic], i * 50_000_000, bytes(serialize(message, kind)))
+                bag.write(connections[topic], i * 50_000_000, spoiled(bytes(serialize(message, kind))))
         files = [path] if version == "1" else sorted(path.iterdir(), reverse=True)
         return {str(each.relative_to(folder)): each.read_bytes() for each in files}
 
@@ -53,7 +56,7 @@ def geometry(store, name, *values):
     return store.types[f"geometry_msgs/msg/{name}"](*values)
 
 
-def scan_bag(version, log, turned=False):
+def scan_bag(version, log, turned=False, spoiled=bytes):
     """A log with odometry, and with the laser's place on the robot, or with its place on the map."""
 
     def messages(store):
@@ -77,10 +80,10 @@ def scan_bag(version, log, turned=False):
             twist = geometry(store, "TwistWithCovariance", geometry(store, "Twist", *speeds), np.zeros(36))
             yield "/odom", ODOMETRY, store.types[ODOMETRY](header(store, i, "odom"), "base_link", pose, twist)
 
-    return written(version, messages)
+    return written(version, messages, spoiled)
 
 
-def map_bag(version, grid):
+def map_bag(version, grid, spoiled=bytes):
     """A map on /map."""
 
     def messages(store):
@@ -92,4 +95,4 @@ def map_bag(version, grid):
         percent = np.where(grid.unknown, -1, np.rint(100 * np.nan_to_num(grid.occupancy))).astype(np.int8)
         yield "/map", GRID, store.types[GRID](header(store, 0, "map"), frame, percent.ravel())
 
-    return written(version, messages)
+    return written(version, messages, spoiled)

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from damage import damaged, pick
+from damage import BINARY, damaged, pick
 from PIL import Image
 from watch import Wrong, pushed
 
@@ -39,8 +39,9 @@ from dollop.replication import study
 from dollop.replication.worlds import survey
 from dollop.robot import MonteCarloLocalizer, ObstacleMap
 
-Kind = namedtuple("Kind", "seeds read further needs", defaults=(None,))
-"""Valid files, each a dict of names to contents, the one that is read first; how it is read; what is done then."""
+Kind = namedtuple("Kind", "seeds read further needs anew", defaults=(None, None))
+"""Valid files, each a dict of names to contents, the one that is read first; how it is read; what is done then; what
+must be installed; and what makes, by chance, files that are wrong inside only, where that takes a writer."""
 ANGLES = np.deg2rad(np.arange(-90, 91, 10.0))
 CANS = [[1.2, 0.8, 1.5, 1.1], [3.0, 1.7, 3.4, 2.1]]
 
@@ -399,6 +400,21 @@ def bags(version):
     return [scan_bag(version, log), scan_bag(version, log, turned=True), map_bag(version, grid)]
 
 
+def spoiled_bag(version, rng):
+    """A bag that is in order, with messages that are not."""
+    from bags import map_bag, scan_bag
+
+    log, grid = small_scans(3), OccupancyGrid(small_map().occupancy[:6, :8], (0.0, 0.0), 0.1)
+    often = pick(rng, (1.0, 0.3))
+
+    def spoiled(message):
+        return pick(rng, BINARY)(message, rng) if rng.random() < often else message
+
+    if rng.random() < 0.3:
+        return map_bag(version, grid, spoiled)
+    return scan_bag(version, log, bool(rng.integers(2)), spoiled)
+
+
 def read_bag(path):
     """The log of a bag, or its map where it holds no scan."""
     if path.is_dir() and len(list(path.iterdir())) == 1 and not (path / "metadata.yaml").exists():
@@ -470,9 +486,9 @@ KINDS = {
     "task 1": Kind(partial(tasks, "1"), read_any_task, use_task),
     "scene": Kind(scenes, read_scene, use_scene),
     "recording": Kind(recordings, read_recording, use_recording),
-    "ros 1 bag": Kind(partial(bags, "1"), read_bag, use_bag, "rosbags"),
-    "ros 2 bag": Kind(partial(bags, "2"), read_bag, use_bag, "rosbags"),
-    "mcap": Kind(partial(bags, "mcap"), read_bag, use_bag, "rosbags"),
+    "ros 1 bag": Kind(partial(bags, "1"), read_bag, use_bag, "rosbags", partial(spoiled_bag, "1")),
+    "ros 2 bag": Kind(partial(bags, "2"), read_bag, use_bag, "rosbags", partial(spoiled_bag, "2")),
+    "mcap": Kind(partial(bags, "mcap"), read_bag, use_bag, "rosbags", partial(spoiled_bag, "mcap")),
     "study": Kind(study_tables, read_results, use_results),
     "worlds": Kind(world_tables, survey.read_table, use_worlds),
 }
@@ -497,6 +513,8 @@ def chance(name, seed, index, *more):
 def damaged_files(name, seed, index):
     """File `index` of a kind from a seed, {name: content}."""
     rng = chance(name, seed, index)
+    if KINDS[name].anew and rng.random() < 0.3:
+        return KINDS[name].anew(rng)
     seeds = seeds_of(name)
     files = dict(pick(rng, seeds))
     which = pick(rng, list(files))
