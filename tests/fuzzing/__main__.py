@@ -67,13 +67,15 @@ def do(piece):
 def run(pieces, options):
     """Do pieces of one seed; prints a table and returns how many failed."""
     found, causes = collections.defaultdict(collections.Counter), collections.Counter()
+    slowest = collections.Counter()
     for piece, outcome in watch_all(do, pieces, options.workers, int(options.memory * 2**30)):
         found[piece[0]][outcome.verdict] += 1
+        slowest[piece[0]] = max(slowest[piece[0]], outcome.seconds)
         if outcome.verdict == "failed":
             causes[outcome.cause] += 1
             if causes[outcome.cause] <= 3:
                 keep(piece, outcome, options.folder)
-    tell(found, pieces[0][1])
+    tell(found, slowest, pieces[0][1])
     for cause, times in causes.most_common():
         print(f"{times:6} x {cause}", flush=True)
     return sum(causes.values())
@@ -95,13 +97,13 @@ def keep(piece, outcome, folder):
     (place / "told.txt").write_text(f"{outcome.cause}\n{command}\n{what}\n{outcome.told}\n", errors="backslashreplace")
 
 
-def tell(found, seed):
+def tell(found, slowest, seed):
     """A table of kinds."""
-    print(f"\n{'seed ' + str(seed):20}{'files':>8}" + "".join(f"{verdict:>10}" for verdict in VERDICTS))
+    print(f"\n{'seed ' + str(seed):20}{'files':>8}" + "".join(f"{verdict:>10}" for verdict in VERDICTS) + "   slowest")
     total = sum(found.values(), collections.Counter())
     for name, counts in [*found.items(), ("all", total)]:
         numbers = "".join(f"{counts[verdict]:10}" for verdict in VERDICTS)
-        print(f"{name:20}{sum(counts.values()):8}{numbers}")
+        print(f"{name:20}{sum(counts.values()):8}{numbers}{slowest[name] or max(slowest.values()):8.2f} s")
 
 
 def again(piece, kept):

@@ -4,6 +4,7 @@ import pytest
 
 pytest.importorskip("resource", reason="processes are forked and bounded as Unix can")
 
+import bombs
 import calls
 import kinds
 from watch import watch_all, watched
@@ -52,3 +53,12 @@ def test_valid_calls_are_accepted():
     for name, call in calls.calls().items():
         if "path" not in call.arguments:
             calls.check_result(call.function(**call.arguments), call.may, name)
+
+
+@pytest.mark.parametrize("name", bombs.bombs())
+def test_bombs_are_refused(name):
+    """In 200 MiB; of a log that is in order, the map is."""
+    kind, files = bombs.bombs()[name]
+    ((_, outcome),) = watch_all(lambda files: kinds.one((kind, SEED, 0), files), [files], extra=bombs.MEGABYTES * 2**20)
+    wanted = "accepted" if "log of" in name else "refused"
+    assert outcome.verdict == wanted, f"{outcome.cause}\n{outcome.told}"

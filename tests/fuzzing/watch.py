@@ -26,8 +26,8 @@ AT_ONCE = 500
 """Pieces of work that one process does before another takes its place."""
 RAISE = dis.opmap["RAISE_VARARGS"]
 
-Outcome = namedtuple("Outcome", "verdict cause told", defaults=("", ""))
-"""accepted, refused or failed; of a failure its cause, the same for all of one kind, and all that is known."""
+Outcome = namedtuple("Outcome", "verdict cause told seconds", defaults=("", "", 0.0))
+"""accepted, refused or failed; of a failure its cause, the same for all of one kind, and all that is known; time."""
 
 
 class Wrong(Exception):
@@ -132,7 +132,7 @@ def watched(work, *arguments):
     Who calls it must be in the main thread; memory is bounded by `bounded`.
     """
     signal.signal(signal.SIGALRM, ring)
-    heard = Heard()
+    heard, begin = Heard(), time.monotonic()
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         warnings.showwarning = heard
@@ -149,7 +149,8 @@ def watched(work, *arguments):
             outcome = failed(error, what) if what else Outcome("refused", "", str(error))
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
-    return outcome if outcome.verdict == "failed" else heard.wrong or outcome
+    outcome = outcome if outcome.verdict == "failed" else heard.wrong or outcome
+    return outcome._replace(seconds=time.monotonic() - begin)
 
 
 # ---- many
