@@ -56,6 +56,24 @@ def finite(name, values, also=()):
         raise Wrong(f"{name} is not finite")
 
 
+def same(name, again, before):
+    """What was written and read again is what it was."""
+    if np.shape(again) != np.shape(before) or not np.allclose(again, before, rtol=1e-6, atol=1e-9):
+        raise Wrong(f"{name} are other ones when they are read again")
+
+
+def read_again(write, path, read):
+    """What was accepted, written and read again; None if it is not written, which may be refused in words."""
+    path.unlink(missing_ok=True)
+    pushed(write, path)
+    if not path.exists():
+        return None
+    try:
+        return read(path)
+    except ValueError as error:
+        raise Wrong("what the library wrote it refuses") from error
+
+
 # ---- a small world
 
 
@@ -147,6 +165,12 @@ def read_any_log(path):
     return log
 
 
+def check_odometry(odometry):
+    """What odometry promises."""
+    if odometry is not None:
+        finite("odometry", np.column_stack([odometry.t, odometry.poses, odometry.velocities]))
+
+
 def check_observation(found):
     """What was observed is finite."""
     if found is not None:
@@ -167,16 +191,12 @@ def use_log(log, path, rng):
     """Make a map of a log, observe it, write it, and now and then localise it."""
     check_map(pushed(OccupancyGrid.from_log, log, 0.1))
     check_observation(pushed(observe, log, small_map()))
-    odometry = None
-    if str(path).endswith((".log", ".gz")):
-        odometry = pushed(read_odometry, path)
-    if odometry is not None:
-        finite("odometry", np.column_stack([odometry.t, odometry.poses]))
-    again = Path(path).with_name("again.log")
-    again.unlink(missing_ok=True)
-    pushed(write_log, again, log)
-    if again.exists():
-        check_log(read_log(again))
+    odometry = pushed(read_odometry, path) if str(path).endswith((".log", ".gz")) else None
+    check_odometry(odometry)
+    again = read_again(partial(write_log, log=log), Path(path).with_name("again.log"), read_log)
+    if again is not None:
+        check_log(again)
+        same("the scans", np.shape(again.ranges), np.shape(log.ranges))
     if rng.random() < 0.03:
         placed = pushed(localise, log, odometry, small_map())
         if placed is not None:
@@ -236,9 +256,11 @@ def use_map(grid, path, rng):
         pushed(localiser.update, (0.0, 0.0, 0.0), small_scans().ranges[0])
         finite("a pose", localiser.pose, [np.nan])
     suffix = pick(rng, (".map", ".yaml"))
-    again = Path(path).with_name("again" + suffix)
-    if pushed(grid.save, again) is None and again.exists():
-        check_map(pushed(OccupancyGrid.load, again))
+    again = read_again(grid.save, Path(path).with_name("again" + suffix), OccupancyGrid.load)
+    if again is not None:
+        check_map(again)
+        same("the cells", np.isnan(again.occupancy), np.isnan(grid.occupancy))
+        same("the map's place", [*again.origin, again.resolution], [*grid.origin, grid.resolution])
 
 
 # ---- tasks
@@ -292,11 +314,10 @@ def use_task(task, path, rng):
     errors = pushed(task.errors)
     if errors is not None:
         finite("the task's errors", errors, [np.nan])
-    again = Path(path).with_name("again.json")
-    again.unlink(missing_ok=True)
-    pushed(task.save, again)
-    if again.exists():
-        check_task(Task.load(again))
+    again = read_again(task.save, Path(path).with_name("again.json"), Task.load)
+    if again is not None:
+        check_task(again)
+        same("the subgoals", again.law.subgoals, task.law.subgoals)
     if rng.random() < 0.1:
         run = pushed(perform, task, Unicycle((*task.law.start, 0.0)), timeout=5.0)
         if run is not None:
@@ -344,9 +365,8 @@ def use_scene(scene, path, rng):
     for k in range(min(3, len(scene.objects))):
         finite("an object's place", pushed(scene.object_at, k, 1.0))
     repr(scene)
-    again = Path(path).with_name("again.json")
-    scene.save(again)
-    Scene.load(again)
+    again = read_again(scene.save, Path(path).with_name("again.json"), Scene.load)
+    same("the objects", again.positions, scene.positions)
 
 
 def recordings():
@@ -386,7 +406,7 @@ def read_recording(path):
 def use_recording(found, path, rng):
     """Tell of it, and write it again."""
     repr(found)
-    pushed(found.save, Path(path).with_name("again.log"))
+    read_again(found.save, Path(path).with_name("again.log"), Recording.load)
 
 
 # ---- bags
@@ -432,7 +452,7 @@ def use_bag(found, path, rng):
         use_map(found, path, rng)
     else:
         use_log(found, path, rng)
-        pushed(read_odometry, path)
+        check_odometry(pushed(read_odometry, path))
 
 
 # ---- tables of the study
