@@ -24,6 +24,16 @@ SECONDS, BYTES, LONGEST = 10.0, 2**30, 300
 LIBRARY, HERE = Path(dollop.__file__).parent, Path(__file__).parent
 AT_ONCE = 500
 """Pieces of work that one process does before another takes its place."""
+FOREIGN = (
+    "broadcast", "reshape", "operands", "ambiguous", "inhomogeneous", "setting an array element", "out of bounds for",
+    "object is not", "has no attribute", "unsupported operand", "not supported between", "not iterable", "must be str",
+    "positional argument", "unexpected keyword", "required argument", "argument must be", "cannot convert",
+    "too large to convert", "Lengths must match", "unpack (expected", "KeyError", "TypeError", "IndexError",
+    "AttributeError",
+)  # fmt: skip
+"""What numpy, pandas and Python say of the code and not of the file: caught, it is still no word of the library."""
+QUOTED = "not a readable ROS bag ("
+"""What begins a message that says with whose words it goes on: those of rosbags."""
 RAISE = dis.opmap["RAISE_VARARGS"]
 
 Outcome = namedtuple("Outcome", "verdict cause told seconds", defaults=("", "", 0.0))
@@ -76,9 +86,12 @@ def fault(error):
 
 
 def fault_of_text(text):
-    """What is wrong with a message; nothing if it is one line of at most 300 characters."""
+    """What is wrong with a message; nothing if it is one line of at most 300 characters, in words of the library."""
     if len(text) > LONGEST:
         return "a message too long"
+    for words in FOREIGN:
+        if words in text and QUOTED not in text:
+            return f"a message with the words of others, '{words}',"
     return "" if text.isprintable() else "a message of several lines, or not printable"
 
 
