@@ -12,8 +12,9 @@ export MPLBACKEND := Agg
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-FUZZ_FILES ?= 50000
-FUZZ_CALLS ?= 6000
+FUZZ_FILES ?= 20000
+FUZZ_CALLS ?= 3000
+FUZZ_KILLS ?= 100
 FUZZ_SEED ?= 0
 
 help:  ## this list
@@ -32,8 +33,10 @@ fast: .venv/ready  ## the tests of the library alone, without the replication
 coverage: .venv/ready  ## which lines of the library its tests run
 	$(RUN) -m pytest -q -m "not replication" --cov=dollop --cov-report=term
 
-fuzz: .venv/ready  ## damaged files and hostile calls, some ten minutes; FUZZ_FILES=100000 FUZZ_SEED="0 1" for more
+fuzz: .venv/ready  ## damaged files, hostile calls, kills: half an hour; FUZZ_FILES=100000 FUZZ_SEED="0 1" for others
 	$(RUN) tests/fuzzing --files $(FUZZ_FILES) --calls $(FUZZ_CALLS) --seed $(FUZZ_SEED)
+	$(RUN) tests/fuzzing/kills.py --kills $(FUZZ_KILLS) --seed 0
+	$(RUN) tests/fuzzing/study_kills.py --kills $(FUZZ_KILLS) --seed 0
 
 check: .venv/ready  ## lint and formatting
 	$(RUN) -m ruff check .

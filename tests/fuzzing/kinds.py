@@ -35,8 +35,6 @@ from dollop.lab.outlines import meeting
 from dollop.lab.recording import Recording
 from dollop.lab.scenes import Scene, empty_scene, figure_eight_scene
 from dollop.lab.things import Move, Object, Person, Robot
-from dollop.replication import study
-from dollop.replication.worlds import survey
 from dollop.robot import MonteCarloLocalizer, ObstacleMap
 
 Kind = namedtuple("Kind", "seeds read further needs anew", defaults=(None, None))
@@ -459,10 +457,16 @@ def use_bag(found, path, rng):
 # ---- tables of the study
 
 
+def lines_of_study(name):
+    """The lines of a table in the checkout."""
+    import dollop.replication
+
+    return (Path(dollop.replication.__file__).parents[2] / "study" / name).read_bytes().split(b"\n")
+
+
 def study_tables():
     """A few rows of the study."""
-    folder = Path(study.__file__).parents[2] / "study"
-    lines = (folder / "results.csv").read_bytes().split(b"\n")
+    lines = lines_of_study("results.csv")
     wanted = [line for line in lines if line.split(b",")[1:2] in ([b"0"], [b"1"], [b"2"])]
     rows = [line for line in wanted if line.split(b",")[0] in (b"loss", b"scaled", b"figure", b"kidnap")]
     return [{"results.csv": b"\n".join([lines[0], *rows, b""])}, {"results.csv": b"\n".join([lines[0], rows[0], b""])}]
@@ -470,11 +474,15 @@ def study_tables():
 
 def read_results(path):
     """The table of the study."""
+    from dollop.replication import study
+
     return study.read_table(path)
 
 
 def use_results(table, path, rng):
     """Sum up."""
+    from dollop.replication import study
+
     found = pushed(study.summaries, table)
     if found is not None:
         pushed(study.claims_table, found)
@@ -483,12 +491,20 @@ def use_results(table, path, rng):
 
 def world_tables():
     """A few rows of the study of worlds."""
-    lines = (Path(study.__file__).parents[2] / "study" / "worlds.csv").read_bytes().split(b"\n")
-    return [{"worlds.csv": b"\n".join([*lines[:12], b""])}]
+    return [{"worlds.csv": b"\n".join([*lines_of_study("worlds.csv")[:12], b""])}]
+
+
+def read_worlds(path):
+    """The table of worlds."""
+    from dollop.replication.worlds import survey
+
+    return survey.read_table(path)
 
 
 def use_worlds(table, path, rng):
     """Sum up."""
+    from dollop.replication.worlds import survey
+
     found = pushed(survey.summary, table)
     if found is not None:
         json.dumps(found, allow_nan=False)
@@ -510,8 +526,8 @@ KINDS = {
     "ros 1 bag": Kind(partial(bags, "1"), read_bag, use_bag, "rosbags", partial(spoiled_bag, "1")),
     "ros 2 bag": Kind(partial(bags, "2"), read_bag, use_bag, "rosbags", partial(spoiled_bag, "2")),
     "mcap": Kind(partial(bags, "mcap"), read_bag, use_bag, "rosbags", partial(spoiled_bag, "mcap")),
-    "study": Kind(study_tables, read_results, use_results),
-    "worlds": Kind(world_tables, survey.read_table, use_worlds),
+    "study": Kind(study_tables, read_results, use_results, "dollop.replication"),
+    "worlds": Kind(world_tables, read_worlds, use_worlds, "dollop.replication"),
 }
 
 

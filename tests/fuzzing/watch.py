@@ -170,7 +170,7 @@ def watched(work, *arguments):
 
 
 def bounded(extra=BYTES):
-    """Let this process have so many bytes more than it has."""
+    """Let this process have so many bytes more than it has (on Linux)."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + extra
     resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
