@@ -54,7 +54,8 @@ NUMBERS, RECORDS = "numbers and arrays", "in place of records"
 """Kinds of calls, by what the hostile argument takes."""
 MAY = {
     "ranges": (np.inf,), "occupancy": (np.nan,), "directions": (np.nan,), "measurements": (np.nan,),
-    "probability": (np.nan,), "margin": (np.inf,), "first": (np.inf, np.nan), "evidence": (),
+    "probability": (np.nan,), "margin": (np.inf,), "first": (np.inf, np.nan),
+    "gate": (np.inf,), "gate_min": (np.inf,), "gate_max": (np.inf,), "disappear_after": (np.inf,),
 }  # fmt: skip
 """Fields in which other than finite numbers mean something, by what they mean."""
 
