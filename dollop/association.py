@@ -24,9 +24,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dollop.checks import checked_array, checked_positions
+from dollop.checks import (
+    FARTHEST,
+    checked_array,
+    checked_flag,
+    checked_positions,
+    checked_record,
+    checked_records,
+    checked_whole,
+    checked_wholes,
+    put_in,
+)
 from dollop.environment import Environment
-from dollop.matching import match_surely
+from dollop.matching import Matching, match_surely
 from dollop.pose import rotation, wrapped
 
 __all__ = [
@@ -39,6 +49,7 @@ __all__ = [
 ]
 
 _EPSILON = 0.05**2  # m²: corners are not known better than to a cell of the foreground grid
+_ROUNDING = 1e-6  # by which weights that sum to 1 may miss it
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +67,38 @@ class Association:
         that are gone.
     differences : (K, m, 2) array
         s - omega_l in m.
+
+    Raises
+    ------
+    ValueError
+        Corners that the environment does not have, weights that are negative or sum to more than 1,
+        or differences larger than any within 1e9 m of the origin.
     """
 
     environment: Environment
     corners: np.ndarray
     weights: np.ndarray
     differences: np.ndarray
+
+    def __post_init__(self):
+        known = len(checked_record("environment", self.environment, Environment).corners)
+        corners = checked_wholes("corners", self.corners, "K", "m", most=max(known - 1, 0))
+        if corners.size and not known:
+            raise ValueError("corners must be those of the environment, which has no objects")
+        most = 1 + _ROUNDING
+        weights = checked_array("weights", self.weights, *corners.shape, least=0, most=most)
+        heaviest = weights.sum(axis=1).max(initial=0)
+        if heaviest > most:
+            raise ValueError(f"the weights of a subgoal must sum to 1 at most, got {heaviest:g}")
+        differences = checked_array(
+            "differences",
+            self.differences,
+            *corners.shape,
+            2,
+            least=-2 * FARTHEST,
+            most=2 * FARTHEST,
+        )
+        put_in(self, corners=corners, weights=weights, differences=differences)
 
     def __repr__(self):
         subgoals, corners = self.corners.shape
@@ -99,7 +136,7 @@ class Association:
             gone = f"all of subgoal {lost[0]}: corners {self.corners[lost[0]].tolist()}"
             raise ValueError(f"a subgoal needs a matched corner, the matching leaves out {gone}")
         differences = self.differences
-        if turned:
+        if checked_flag("turned", turned):
             matched = indices >= 0
             before, now = self.environment.corners[matched], environment.corners[indices[matched]]
             differences = differences @ rotation(layout_turn(before, now)).T
@@ -134,7 +171,10 @@ class Association:
     def _ties(self, environment, matching):
         """Where all corners go (4N,), where those of each subgoal go (K, m), and their weights."""
         names = "the associated environment", "the new one"
-        matching = matching or match_surely(self.environment, environment, names)[0]
+        checked_record("environment", environment, Environment)
+        if matching is None:
+            matching, _ = match_surely(self.environment, environment, names)
+        checked_record("matching", matching, Matching)
         n, m, indices = len(self.environment.corners), len(environment.corners), matching.indices
         highest = indices.max(initial=-1)
         if len(indices) != n or highest >= m:
@@ -176,11 +216,10 @@ def associate(subgoals, environment, m=4):
     [[1.5, 3.0]]
     """
     subgoals = checked_positions("subgoals", subgoals)
-    corners = environment.corners
+    corners = checked_record("environment", environment, Environment).corners
     if len(corners) == 0:
         raise ValueError("subgoals need an environment of at least 1 object, got 0")
-    if m not in range(1, len(corners) + 1):
-        raise ValueError(f"m must be a whole number between 1 and the number of corners {len(corners)}, got {m}")
+    m = checked_whole("m, of the corners,", m, 1, len(corners))
     differences = subgoals[:, None] - corners
     squares = (differences**2).sum(axis=2)
     nearest = np.argsort(squares, axis=1, kind="stable")[:, :m]
@@ -209,7 +248,10 @@ def layout_turn(corners_i, corners_j):
     >>> round(np.degrees(layout_turn(square, square[[1, 2, 3, 0]])))
     90
     """
-    z, w = (np.asarray(corners, dtype=float) @ (1, 1j) for corners in (corners_i, corners_j))
+    given = checked_positions("corners_i", corners_i)
+    z, w = given @ (1, 1j), checked_positions("corners_j", corners_j, len(given), 2) @ (1, 1j)
+    if not len(given):
+        return 0.0
     return float(np.angle((z - z.mean()).conj() @ (w - w.mean())))
 
 
@@ -235,9 +277,8 @@ class Frames:
 
     def __post_init__(self):
         positions = checked_positions("positions", self.positions)
-        directions = checked_array("directions", self.directions, len(positions))
-        object.__setattr__(self, "positions", positions)
-        object.__setattr__(self, "directions", wrapped(directions))
+        directions = checked_positions("directions", self.directions, len(positions))
+        put_in(self, positions=positions, directions=wrapped(directions))
 
     def __repr__(self):
         return f"Frames of {len(self)} objects"
@@ -256,10 +297,23 @@ class FrameAssociation:
         Each subgoal as seen from each frame, in m.
     weights : (M, K) array
         How much each frame counts for each subgoal, one column sums to 1.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not belong together, or weights that are negative or sum to more than 1.
     """
 
     local: np.ndarray
     weights: np.ndarray
+
+    def __post_init__(self):
+        weights = checked_array("weights", self.weights, "M", "K", least=0, most=1 + _ROUNDING)
+        heaviest = weights.sum(axis=0).max(initial=0)
+        if heaviest > 1 + _ROUNDING:
+            raise ValueError(f"the weights of a subgoal must sum to 1 at most, got {heaviest:g}")
+        local = checked_array("local", self.local, *weights.shape, 2, least=-2 * FARTHEST, most=2 * FARTHEST)
+        put_in(self, local=local, weights=weights)
 
     def __repr__(self):
         frames, subgoals = self.weights.shape
@@ -283,7 +337,7 @@ class FrameAssociation:
         ValueError
             Another number of frames.
         """
-        if len(frames) != len(self.local):
+        if len(checked_record("frames", frames, Frames)) != len(self.local):
             raise ValueError(f"the number of frames must stay {len(self.local)}, got {len(frames)}")
         moved = self.local @ rotation(frames.directions).swapaxes(1, 2) + frames.positions[:, None]
         return np.einsum("mk,mkd->kd", self.weights, moved)
@@ -321,7 +375,8 @@ def associate_with_frames(subgoals, frames):
     >>> bool(associate_with_frames([[[1, 0]], [[1, 2]]], [still, moved]).weights[1, 0] > 0.8)
     True
     """
-    subgoals = checked_array("subgoals", subgoals, "D", "K", 2)
+    subgoals = checked_positions("subgoals", subgoals, "D", "K", 2)
+    frames = checked_records("frames", frames, Frames)
     counts = [len(f) for f in frames]
     if len(counts) != len(subgoals) or len(set(counts)) != 1 or counts[0] == 0:
         rule = "one demonstration at least, and for each the same frames, at least 1, are needed"

@@ -1,6 +1,7 @@
 """The command line: dollop map, observe, data, study; each command loads only what it needs."""
 
 import argparse
+import os
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -8,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 import dollop
-from dollop.formats.writing import check_writable, whole_file
-from dollop.gridmap import check_is_map
+from dollop.formats.kinds import EVERYBODY, PNG, TRAJECTORY
+from dollop.formats.writing import Output, check_outputs, together, whole_file
+from dollop.gridmap import map_inputs, map_outputs
 from dollop.people import moving_speed
 from dollop.trajectory import arc_length
 
@@ -60,10 +62,16 @@ def in_one_line(program, work, *arguments):
     Raises
     ------
     SystemExit
-        With 1 and the message for what is refused, 130 when interrupted.
+        With 1 and the message for what is refused, 130 when interrupted. If nobody reads what it
+        says (a pipe that is closed) the work is done all the same, and the status 1.
     """
     try:
         work(*arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Or Python would say so once more when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
     except (ValueError, OSError, ImportError, OverflowError) as error:
         sys.exit(f"{program}: {error}")
     except KeyboardInterrupt as stop:
@@ -169,8 +177,7 @@ def replication(module):
 
 def _map(options):
     """dollop map LOG MAP"""
-    check_is_map(options.map)
-    check_writable(options.map)
+    check_outputs(map_outputs(options.map), [options.log])
     log = dollop.read_log(options.log, options.topic, options.fov)
     dollop.OccupancyGrid.from_log(log, options.resolution).save(options.map)
     print(f"wrote {options.map}")
@@ -197,34 +204,33 @@ def _observe(options):
         for note in found.notes:
             print(note, file=sys.stderr)
         raise ValueError(f"nobody walks in {options.log}; tracks of something else: {len(found.tracks)}")
-    written = [out, picture]
-    _write_track(found.user, out)
-    _draw_observation(found, background, picture)
-    if options.tracks:
-        _write_people(found.people, options.tracks)
-        written.append(options.tracks)
+    with together():
+        if options.tracks:
+            _write_people(found.people, options.tracks)
+        _draw_observation(found, background, picture)
+        _write_track(found.user, out)
     walked, seconds = arc_length(found.user.positions)[-1], np.ptp(found.user.t)
     hidden = f"out of sight for {found.user.occluded.mean():.0%}"
     print(f"the user walked {walked:.1f} m in {seconds:.1f} s, {hidden}; {len(found.environment)} static objects")
     _tell(found, log.t[0])
-    print(f"wrote {', '.join(map(str, written))}")
+    print(f"wrote {', '.join(map(str, filter(None, (out, picture, options.tracks))))}")
     if not found.trusted:
         sys.exit(IN_DOUBT)
 
 
 def _outputs(options):
-    """Paths of the trajectory and its picture, if both can be written and cover no input."""
+    """Paths of the trajectory and its picture, if both can be written and are no input."""
     out = Path(options.out)
     tracks = [Path(options.tracks)] if options.tracks else []
     if any(path.suffix != ".csv" or path == out for path in tracks):
         raise ValueError(f"--tracks must be named .csv, and not as --out, got {options.tracks}")
     if out.suffix != ".csv":
         raise ValueError(f"--out must be named .csv (its picture, .png, lands beside it), got {out}")
-    if out.with_suffix("").resolve() == Path(options.map).with_suffix("").resolve():
-        raise ValueError(f"--out must have another name than the map, whose picture it may replace, got {out}")
-    for path in (out, out.with_suffix(".png"), *tracks):
-        check_writable(path)
-    return out, out.with_suffix(".png")
+    picture = out.with_suffix(".png")
+    outputs = [Output(out, TRAJECTORY), Output(picture, PNG)]
+    outputs += [Output(path, EVERYBODY) for path in tracks]
+    check_outputs(outputs, [options.log, *map_inputs(options.map)])
+    return out, picture
 
 
 def _tell(found, begin):
@@ -242,7 +248,7 @@ def _tell(found, begin):
 
 def _write_track(user, path):
     """The user's trajectory as a table."""
-    with whole_file(path, "w") as stream:
+    with whole_file(path, "w", TRAJECTORY) as stream:
         _table(user).to_csv(stream, index=False, float_format="%.4f")
 
 
@@ -251,7 +257,7 @@ def _write_people(people, path):
     import pandas as pd
 
     tables = [_table(who).assign(person=k) for k, who in enumerate(people)]
-    with whole_file(path, "w") as stream:
+    with whole_file(path, "w", EVERYBODY) as stream:
         pd.concat(tables).to_csv(stream, index=False, float_format="%.4f")
 
 
@@ -276,9 +282,11 @@ def _draw_observation(found, background, path):
         plot.boxes(ax, found.environment.boxes, "static objects")
         plot.path(ax, found.user.positions, "user")
         plot.plane(ax).legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-        with whole_file(path) as stream:
-            figure.savefig(stream)
-        plt.close(figure)
+        try:
+            with whole_file(path, kind=PNG) as stream:
+                figure.savefig(stream, format="png")
+        finally:
+            plt.close(figure)
 
 
 def _data(options):

@@ -17,8 +17,16 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from dollop.checks import checked_array, put_in
-from dollop.gridmap import flat_cells
+from dollop.checks import (
+    FARTHEST,
+    checked_array,
+    checked_flags,
+    checked_number,
+    checked_positions,
+    checked_record,
+    put_in,
+)
+from dollop.gridmap import SIDES, flat_cells
 from dollop.pose import wrapped
 
 __all__ = [
@@ -36,6 +44,12 @@ _CORNER_COLUMNS = np.array([[0, 1], [2, 1], [2, 3], [0, 3]])
 # The ceiling would make 1 of a rounding error of 1e-13: changes of force below this many units
 # count as none.
 _ROUNDING = 1e-6
+_ONE_PLACE, _MOST_COSTS = (
+    1e-12,
+    2.0**53,
+)  # m²: corners that coincide; and what a whole number can be
+# Those of 500 objects: their springs take 250 MB.
+MOST_CORNERS = 2000
 
 
 LINK, SPACINGS = 0.15, 2.2
@@ -66,11 +80,25 @@ class Seen:
         Lower left corner, x, y in m.
     resolution : float
         Side of a cell in m.
+
+    Raises
+    ------
+    ValueError
+        A floor that is no grid of flags, an origin beyond 1e9 m, a resolution that is not a micrometre
+        at least and a kilometre at most.
     """
 
     floor: np.ndarray
     origin: tuple
     resolution: float
+
+    def __post_init__(self):
+        put_in(
+            self,
+            floor=checked_flags("floor", self.floor, "H", "W"),
+            origin=tuple(checked_positions("origin", self.origin, 2).tolist()),
+            resolution=checked_number("resolution", self.resolution, *SIDES),
+        )
 
     def at(self, points):
         """Whether an object that stood there would have been found.
@@ -85,12 +113,17 @@ class Seen:
         (M,) bool array
             False off the map.
 
+        Raises
+        ------
+        ValueError
+            For what are no positions within 1e12 m.
+
         Examples
         --------
         >>> Seen(np.array([[True, False]]), (0.0, 0.0), 1.0).at([[0.5, 0.5], [1.5, 0.5], [9.0, 9.0]]).tolist()
         [True, False, False]
         """
-        points = np.asarray(points, dtype=float).reshape(-1, 2)
+        points = checked_array("points", points, "...", 2, least=-1e12, most=1e12).reshape(-1, 2)
         cells, inside = flat_cells(points, self.origin, self.resolution, self.floor.shape)
         found = np.zeros(len(points), bool)
         found[inside] = self.floor.ravel()[cells]
@@ -117,7 +150,8 @@ class Environment:
     Raises
     ------
     ValueError
-        Where the shape is another, a number is not finite, or an extent is negative.
+        Where the shape is another, a number is not finite, an extent is negative, or a box lies
+        beyond 1e9 m of the origin.
 
     Examples
     --------
@@ -133,18 +167,19 @@ class Environment:
     directions: np.ndarray = None
 
     def __post_init__(self):
-        boxes = checked_array("boxes", self.boxes if np.size(self.boxes) else np.empty((0, 4)), "N", 4)
+        none = isinstance(self.boxes, list | tuple | np.ndarray) and len(self.boxes) == 0
+        boxes = checked_positions("boxes", np.empty((0, 4)) if none else self.boxes, "N", 4)
         negative = np.flatnonzero((boxes[:, 2:] < boxes[:, :2]).any(axis=1))
         if len(negative):
             found = f"{boxes[negative[0]].tolist()} for object {negative[0]}"
             raise ValueError(f"a box must have xmin <= xmax and ymin <= ymax, got {found}")
-        assumed = np.zeros(boxes.shape, bool) if self.assumed is None else np.array(self.assumed, bool)
-        if assumed.shape != boxes.shape:
-            raise ValueError(f"assumed must hold four sides for each box, got shape {assumed.shape} for {len(boxes)}")
+        if self.seen is not None:
+            checked_record("seen", self.seen, Seen)
+        assumed = np.zeros(boxes.shape, bool) if self.assumed is None else self.assumed
         put_in(
             self,
             boxes=boxes,
-            assumed=assumed,
+            assumed=checked_flags("assumed", assumed, *boxes.shape),
             directions=checked_directions(self.directions, len(boxes)),
         )
 
@@ -176,12 +211,7 @@ def checked_directions(directions, n):
     """Directions of n objects (n,) in rad, nan where unknown; ValueError for what is none."""
     if directions is None:
         return np.full(n, np.nan)
-    try:
-        directions = np.array(directions, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"directions must be angles in rad, nan where unknown, got {directions!r:.60}") from error
-    if directions.shape != (n,) or np.isinf(directions).any():
-        raise ValueError(f"directions must hold one angle in rad for each of {n} objects, got {directions!r:.80}")
+    directions = checked_array("directions", directions, n, finite=False, least=-FARTHEST, most=FARTHEST)
     return np.where(np.isnan(directions), np.nan, wrapped(np.nan_to_num(directions)))
 
 
@@ -230,7 +260,7 @@ def spring_constants(corners):
     Raises
     ------
     ValueError
-        Where two corners coincide: their spring would be infinite.
+        Where two corners coincide: their spring would be infinite. More than 2000 corners.
 
     Examples
     --------
@@ -258,7 +288,7 @@ def spring_forces(corners):
     Raises
     ------
     ValueError
-        Where two corners coincide.
+        Where two corners coincide. More than 2000 corners.
 
     Examples
     --------
@@ -290,7 +320,7 @@ def integer_costs(corners_i, corners_j, alpha=1e3):
     Raises
     ------
     ValueError
-        Where two corners of one environment coincide.
+        Where two corners of one environment coincide, or are so near that costs exceed 2^53.
 
     Examples
     --------
@@ -300,18 +330,24 @@ def integer_costs(corners_i, corners_j, alpha=1e3):
     >>> np.diag(integer_costs(corners, corners + 7.3)).tolist()
     [0, 0, 0]
     """
+    alpha = checked_number("alpha", alpha, 0)
     changes = scipy.spatial.distance.cdist(spring_forces(corners_i), spring_forces(corners_j))
-    return np.ceil(alpha * changes - _ROUNDING).astype(np.int64)
+    costs = np.ceil(alpha * changes - _ROUNDING)
+    if costs.max(initial=0) > _MOST_COSTS:
+        raise ValueError(f"costs must be at most {_MOST_COSTS:g}, got {costs.max():g}: corners are too near")
+    return costs.astype(np.int64)
 
 
 def _springs(corners):
     """Spring constants (C, C) and differences omega_n - omega_m (C, C, 2) between corners."""
-    corners = np.asarray(corners, dtype=float)
+    corners = checked_positions("corners", corners)
+    if len(corners) > MOST_CORNERS:
+        raise ValueError(f"springs must be between at most {MOST_CORNERS} corners, got {len(corners)}")
     differences = corners - corners[:, None]
     squares = np.einsum("mnd,mnd->mn", differences, differences)
     np.fill_diagonal(squares, np.inf)
-    if squares.min(initial=np.inf) == 0:
-        first, second = np.argwhere(squares == 0)[0]
+    if squares.min(initial=np.inf) < _ONE_PLACE:
+        first, second = np.argwhere(squares < _ONE_PLACE)[0]
         raise ValueError(f"corners {first} and {second} must not coincide: infinite spring")
     return 1 / squares, differences
 

@@ -10,11 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from dollop.checks import check_positive
+from dollop.checks import check_positive, checked_number
 from dollop.gridmap import flat_cells, in_cells, in_metres
 
 _PLACE, _SENSOR, _SINCE, _UNTIL, _STOOD = slice(0, 2), slice(2, 4), 4, 5, slice(0, 6)
 _VALUE, _PASSED, _LOOKS, _COLUMNS = 6, 7, 8, 9
+LEAST_GAIN = 1e-9
+"""Of a foreground grid: less remembers for longer than anybody looks."""
 LONG_MEAN = 50
 """Looks over which the mean of a cell's readings is taken."""
 THROUGH = 0.25
@@ -263,7 +265,7 @@ class ForegroundGrid:
     Raises
     ------
     ValueError
-        A gain out of its range.
+        A gain below a billionth or above 1.
 
     Examples
     --------
@@ -280,9 +282,7 @@ class ForegroundGrid:
     """
 
     def __init__(self, background, gain):
-        if not 0 < gain <= 1:
-            raise ValueError(f"gain must lie in (0, 1], got {gain}")
-        self.gain = gain
+        self.gain = checked_number("gain", gain, LEAST_GAIN, 1)
         self.shape = background.occupancy.shape
         self.origin = np.asarray(background.origin[:2], dtype=float)
         self.resolution = background.resolution

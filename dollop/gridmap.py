@@ -10,14 +10,33 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from dollop.checks import check_positive, checked_array, put_in
+from dollop.checks import (
+    FARTHEST,
+    checked_array,
+    checked_number,
+    checked_positions,
+    checked_record,
+    checked_wholes,
+    put_in,
+)
 from dollop.formats import carmen_map, ros_bag
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.formats.files import FormatError, from_file
+from dollop.formats.files import FormatError, check_cells, from_file
+from dollop.formats.writing import checked_path
+from dollop.laser import LaserLog
 
-__all__ = ["OccupancyGrid", "check_is_map", "covered_cells", "flat_cells", "in_cells", "in_metres"]
+__all__ = [
+    "SIDES", "OccupancyGrid", "check_is_map", "covered_cells", "distances_to", "flat_cells", "in_cells", "in_metres",
+    "map_inputs", "map_outputs",
+]  # fmt: skip
 
-MAX_CELLS = 100_000_000
+FINEST = 1e-3
+"""m: no laser tells more, and a beam passes so many cells."""
+READINGS, POINTS = 100_000, 1_000_000
+"""Beams, and cells along them, that are counted at once: some 100 MB."""
+MOST_ALONG = 1_000_000
+SIDES = 1e-6, 1e3
+"""m: cells of a map are neither smaller nor larger."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +58,8 @@ class OccupancyGrid:
     Raises
     ------
     ValueError
-        If the occupancy is not a grid of probabilities, or resolution or origin are not usable.
+        If the occupancy is not a grid of probabilities, a side of a cell is below a micrometre or
+        beyond a kilometre, or the origin beyond 1e9 m.
 
     Examples
     --------
@@ -61,9 +81,13 @@ class OccupancyGrid:
         wrong = (cells < 0) | (cells > 1)
         if wrong.any():
             raise ValueError(f"occupancy must be in [0, 1] or NaN, got {cells[wrong][0]}")
-        origin = tuple(checked_array("origin", self.origin, 2).tolist())
-        check_positive("resolution", float(self.resolution))
-        put_in(self, occupancy=cells, origin=origin, resolution=float(self.resolution))
+        origin = tuple(checked_positions("origin", self.origin, 2).tolist())
+        put_in(
+            self,
+            occupancy=cells,
+            origin=origin,
+            resolution=checked_number("resolution", self.resolution, *SIDES),
+        )
 
     def __repr__(self):
         height, width = self.occupancy.shape
@@ -97,8 +121,8 @@ class OccupancyGrid:
         Raises
         ------
         ValueError
-            If the grid would have more than 100 million cells, or a parameter is not positive and
-            finite.
+            If the grid would have more than 25 million cells or not lie within 1e9 m of the origin, if
+            `max_range` is no length, or `resolution` is not from 1 mm to 1 km.
 
         Notes
         -----
@@ -117,22 +141,13 @@ class OccupancyGrid:
         >>> grid.free[tuple(grid.world_to_cell([0.3, 0.0]))].item()
         True
         """
-        check_positive("resolution", resolution)
-        check_positive("max_range", max_range)
+        checked_record("log", log, LaserLog)
+        resolution = checked_number("resolution", resolution, FINEST, SIDES[1])
+        max_range = checked_number("max_range", max_range, SIDES[0])
         reach = np.minimum(log.ranges, min(max_range, log.max_range))
-        bearings = log.poses[:, 2, None] + log.angles
-        directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
-        ends = log.poses[:, None, :2] + reach[..., None] * directions
-        frame = _frame(np.vstack([*ends, log.poses[:, :2]]), resolution)
-        is_hit = log.ranges <= max_range
-        # A cell's diagonal before its hit a beam has left no trace yet in the cell that it hits.
-        steps = (reach / resolution - np.sqrt(2) * is_hit).astype(int).clip(0)
-        some = np.array_split(np.arange(len(log)), 1 + steps.size // 10_000)
-        passed = (_passed(log, scans, directions, steps, resolution) for scans in some)
-        passes = sum(_counts(points, *frame) for points in passed)
-        hits = _counts(ends[is_hit], *frame)
-        seen = hits + passes
-        return cls(np.divide(hits, seen, out=np.full(seen.shape, np.nan), where=seen > 0), *frame[:2])
+        some = np.array_split(np.arange(len(log)), min(len(log), 1 + reach.size // READINGS))
+        frame = _frame(np.vstack([_bounds(log, scans, reach) for scans in some]), resolution)
+        return cls(_occupancy(log, some, reach, log.ranges <= max_range, *frame), *frame[:2])
 
     @classmethod
     def load(cls, path):
@@ -174,7 +189,7 @@ class OccupancyGrid:
         FormatError
             If the name says neither.
         OSError
-            If it cannot be written.
+            If it cannot be written, or what is there is no such map or the picture of another.
         """
         _format_of(path).write_map(path, self.occupancy, self.origin, self.resolution)
 
@@ -206,14 +221,19 @@ class OccupancyGrid:
         Parameters
         ----------
         points : (..., 2) array_like
-            x, y in m, finite.
+            x, y in m, within 1e9 m.
 
         Returns
         -------
         (..., 2) int array
             Row and column.
+
+        Raises
+        ------
+        ValueError
+            For what are no positions.
         """
-        x, y = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+        x, y = np.moveaxis(checked_positions("points", points, "...", 2), -1, 0)
         column, row = in_cells(x, y, self.origin, self.resolution)
         return np.floor(np.stack([row, column], axis=-1)).astype(int)
 
@@ -229,8 +249,13 @@ class OccupancyGrid:
         -------
         (..., 2) float array
             x, y in m.
+
+        Raises
+        ------
+        ValueError
+            For what are no numbers of cells.
         """
-        row, column = np.moveaxis(np.asarray(cells), -1, 0)
+        row, column = np.moveaxis(checked_wholes("cells", cells, "...", 2, least=-FARTHEST), -1, 0)
         return np.stack(in_metres(column + 0.5, row + 0.5, self.origin, self.resolution), axis=-1)
 
     def covers(self, points):
@@ -244,9 +269,14 @@ class OccupancyGrid:
         Returns
         -------
         (...,) bool array
+
+        Raises
+        ------
+        ValueError
+            For what are not two numbers each.
         """
         xmin, xmax, ymin, ymax = self.extent
-        x, y = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
+        x, y = np.moveaxis(checked_array("points", points, "...", 2, finite=False), -1, 0)
         return (x >= xmin) & (x < xmax) & (y >= ymin) & (y < ymax)
 
     def distance_field(self):
@@ -261,7 +291,7 @@ class OccupancyGrid:
 
     @cached_property
     def _distances(self):
-        distances = scipy.ndimage.distance_transform_edt(~self.occupied, sampling=self.resolution)
+        distances = distances_to(self.occupied, self.resolution)
         if not self.occupied.any():
             distances[:] = np.inf
         distances.flags.writeable = False
@@ -284,6 +314,11 @@ class OccupancyGrid:
         float
             In m; `inf` where there is no way, or only a longer one.
 
+        Raises
+        ------
+        ValueError
+            What is no place, a negative radius or length, places a million cells apart.
+
         Examples
         --------
         Round a wall of 1 m that ends at the border of the map there is no way.
@@ -292,13 +327,18 @@ class OccupancyGrid:
         >>> grid.way_length((0.2, 0.5), (0.2, 0.9)), grid.way_length((0.2, 0.5), (1.8, 0.5))
         (0.4, inf)
         """
-        place, other = np.asarray(place, dtype=float), np.asarray(other, dtype=float)
+        place, other = checked_positions("place", place, 2), checked_positions("other", other, 2)
+        radius, most = checked_number("radius", radius, 0), checked_number("most", most, 0, np.inf)
         straight = float(np.linalg.norm(other - place))
+        if straight > MOST_ALONG * self.resolution:
+            raise ValueError(f"a way must be at most {MOST_ALONG} cells long, got {straight:g} m")
         line = place + np.linspace(0, 1, 2 + int(straight / self.resolution))[:, None] * (other - place)
         near = self.distance_at(line)
         if not (near <= self.resolution).any():
             return straight
         free, origin, side, graph = self._walkable(radius)
+        if not len(free):
+            return np.inf
         start, goal = (self._nearest_free(each, free, origin, side) for each in (place, other))
         length = scipy.sparse.csgraph.dijkstra(graph, directed=False, indices=start, limit=most)[goal]
         return max(straight, float(length))
@@ -311,7 +351,12 @@ class OccupancyGrid:
             number = np.full(free.shape, -1)
             number[free] = np.arange(free.sum())
             side, links = stride * self.resolution, []
-            for rows, columns, far in ((0, 1, 1.0), (1, 0, 1.0), (1, 1, np.sqrt(2)), (1, -1, np.sqrt(2))):
+            for rows, columns, far in (
+                (0, 1, 1.0),
+                (1, 0, 1.0),
+                (1, 1, np.sqrt(2)),
+                (1, -1, np.sqrt(2)),
+            ):
                 a = number[: number.shape[0] - rows, max(0, -columns) : number.shape[1] - max(0, columns)]
                 b = number[rows:, max(0, columns) : number.shape[1] - max(0, -columns)]
                 both = (a >= 0) & (b >= 0)
@@ -340,8 +385,13 @@ class OccupancyGrid:
         (...,) float array
             Metres; NaN off the map, where nothing is known (see `covers`), so that it is neither
             near nor far.
+
+        Raises
+        ------
+        ValueError
+            For what are not two numbers each.
         """
-        points = np.asarray(points, dtype=float)
+        points = checked_array("points", points, "...", 2, finite=False)
         inside = self.covers(points)
         rows, cols = self.world_to_cell(points[inside]).T
         distances = np.full(inside.shape, np.nan)
@@ -362,8 +412,45 @@ def check_is_map(path):
     FormatError
         If it ends neither in `.yaml` or `.yml` (ROS) nor in `.map` (CARMEN).
     """
-    if Path(path).suffix not in (".map", ".yaml", ".yml"):
+    if checked_path(path).suffix not in (".map", ".yaml", ".yml"):
         raise FormatError("a map is named .yaml (ROS) or .map (CARMEN)", path)
+
+
+def map_outputs(path):
+    """Files that `OccupancyGrid.save` writes.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the map.
+
+    Returns
+    -------
+    list of Output
+
+    Raises
+    ------
+    FormatError
+        If the name is not one of a map.
+    """
+    return _format_of(path).outputs(path)
+
+
+def map_inputs(path):
+    """Files that `OccupancyGrid.load` reads, as far as they are known before.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the map.
+
+    Returns
+    -------
+    list of str or Path
+    """
+    is_ros = Path(path).suffix in (".yaml", ".yml") and not ros_bag.is_bag(path)
+    picture = _format_of(path).picture_of(path) if is_ros else None
+    return [path] if picture is None else [path, picture]
 
 
 def _format_of(path):
@@ -376,14 +463,55 @@ def _format_of(path):
     return ros_map
 
 
+def _rays(log, scans, reach):
+    """Beams of some scans: where they begin, their directions and where they end, (N, 2) each."""
+    bearings = log.poses[scans, 2, None] + log.angles
+    directions = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+    begins = np.broadcast_to(log.poses[scans, None, :2], directions.shape)
+    ends = begins + reach[scans, :, None] * directions
+    return tuple(each.reshape(-1, 2) for each in (begins, directions, ends))
+
+
+def _bounds(log, scans, reach):
+    """Corners (2, 2) of the box round all beams of some scans."""
+    begins, _, ends = _rays(log, scans, reach)
+    both = np.vstack([ends, begins])
+    return np.array([both.min(axis=0), both.max(axis=0)])
+
+
 def _frame(points, resolution):
     """Corner, resolution and shape of a grid that holds the points (M, 2), with a cell to spare."""
+    farthest = np.abs(points).max()
+    if not farthest <= FARTHEST:
+        raise ValueError(f"a map must lie within {FARTHEST:g} m of the origin, got {farthest:g} m")
     left, low = np.floor(points.min(axis=0) / resolution) - 1
     right, high = np.floor(points.max(axis=0) / resolution) + 2
     columns, rows = right - left, high - low
-    if not columns * rows <= MAX_CELLS:
-        raise ValueError(f"{columns} x {rows} cells of {resolution} m are more than {MAX_CELLS}")
+    check_cells(columns, rows)
     return (left * resolution, low * resolution), resolution, (int(rows), int(columns))
+
+
+def _occupancy(log, some, reach, is_hit, origin, resolution, shape):
+    """Hits by hits and passes (H, W), NaN where there is neither, counted in some scans after others."""
+    hits, passes = (np.zeros(shape, dtype=int) for _ in range(2))
+    for scans in some:
+        begins, directions, ends = _rays(log, scans, reach)
+        hits += _counts(ends[is_hit[scans].ravel()], origin, resolution, shape)
+        # A cell's diagonal before its hit a beam has left no trace yet in the cell that it hits.
+        steps = (reach[scans] / resolution - np.sqrt(2) * is_hit[scans]).astype(int).clip(0).ravel()
+        # A laser that stands still must not step over the same corners in every scan: the golden
+        # ratio spreads the phases.
+        phases = np.repeat(scans * ((np.sqrt(5) - 1) / 2) % 1, reach.shape[1])
+        for few in np.split(np.arange(len(steps)), _cuts(steps)):
+            points = _passed(begins[few], directions[few], steps[few], phases[few], resolution)
+            passes += _counts(points, origin, resolution, shape)
+    passes += hits
+    return np.divide(hits, passes, out=np.full(shape, np.nan), where=passes > 0)
+
+
+def _cuts(steps):
+    """Where to cut beams of so many steps (N,) into parts, so that none has many more than `POINTS` in all."""
+    return 1 + np.flatnonzero(np.diff(np.cumsum(steps) // POINTS))
 
 
 def _counts(points, origin, resolution, shape):
@@ -392,15 +520,11 @@ def _counts(points, origin, resolution, shape):
     return np.bincount(cells, minlength=shape[0] * shape[1]).reshape(shape)
 
 
-def _passed(log, scans, directions, steps, resolution):
-    """Points a cell apart along the beams of some scans, as many as there are `steps` (T, B)."""
-    steps = steps[scans]
-    along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps.ravel(), steps.ravel())
-    # A laser that stands still must not step over the same corners in every scan: the golden ratio
-    # spreads the phases.
-    along = along + np.repeat(scans * ((np.sqrt(5) - 1) / 2) % 1, steps.sum(axis=1))
-    starts = np.repeat(log.poses[scans, :2], steps.sum(axis=1), axis=0)
-    ways = np.repeat(directions[scans].reshape(-1, 2), steps.ravel(), axis=0)
+def _passed(begins, directions, steps, phases, resolution):
+    """Points a cell apart along beams (N, 2), as many as there are `steps` (N,), the first by phases of a cell."""
+    along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
+    along = along + np.repeat(phases, steps)
+    starts, ways = np.repeat(begins, steps, axis=0), np.repeat(directions, steps, axis=0)
     return starts + ways * (along * resolution)[:, None]
 
 
@@ -516,3 +640,34 @@ def covered_cells(boxes, origin, resolution, shape):
     for left, bottom, right, top in zip(*low, *high, strict=True):
         covered[bottom:top, left:right] = True
     return covered
+
+
+def distances_to(cells, side=1.0):
+    """Distance of every cell of a grid to the nearest of some, centre to centre.
+
+    Row by row, so that next to the result it takes 9 bytes a cell for a moment (SciPy's own 48).
+
+    Parameters
+    ----------
+    cells : (H, W) bool array
+        Where some are; if there are none, the distances are no numbers to be used.
+    side : float
+        Of a cell in m.
+
+    Returns
+    -------
+    (H, W) float array
+        In m, 0 at the cells themselves.
+
+    Examples
+    --------
+    >>> distances_to(np.array([[True, False, False], [False, False, False]]), 0.5).round(3).tolist()
+    [[0.0, 0.5, 1.0], [0.5, 0.707, 1.118]]
+    """
+    asked = {"return_distances": False, "return_indices": True}
+    nearest = scipy.ndimage.distance_transform_edt(~cells, side, **asked)
+    distances, columns = np.empty(cells.shape), np.arange(cells.shape[1])
+    for row, (near_row, near_column) in enumerate(zip(*nearest, strict=True)):
+        down, right = (near_row - row) * side, (near_column - columns) * side
+        np.sqrt(down * down + right * right, out=distances[row])
+    return distances

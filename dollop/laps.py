@@ -11,7 +11,7 @@ from math import hypot
 import numpy as np
 import scipy
 
-from dollop.checks import Note
+from dollop.checks import LATEST, Note, checked_array
 from dollop.trajectory import arc_length, check_trajectory, resample
 
 __all__ = ["Cut", "cut_laps", "laps"]
@@ -170,9 +170,10 @@ def cut_laps(t, positions):
 
 def even_clock(t, points):
     """Times (M,) at the median period of a track, and its positions (M, 2) there."""
-    t = np.asarray(t, float)
-    if t.shape != (len(points),) or not np.isfinite(t).all() or not (np.diff(t) > 0).all():
-        raise ValueError(f"t must increase and hold one time per position, got shape {t.shape} for {len(points)}")
+    t = checked_array("t, one time for each position,", t, len(points), least=-LATEST, most=LATEST)
+    falls = np.flatnonzero(np.diff(t) <= 0)
+    if len(falls):
+        raise ValueError(f"t must increase, got {t[falls[0]]} and then {t[falls[0] + 1]}")
     period = np.median(np.diff(t))
     ticks = (t[-1] - t[0]) / period
     if ticks > max(PATCHY[0] * len(t), PATCHY[1]):

@@ -4,10 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dollop.checks import check_positive, checked_array, put_in
+from dollop.checks import (
+    LATEST,
+    Note,
+    checked_array,
+    checked_number,
+    checked_positions,
+    checked_records,
+    put_in,
+)
 from dollop.pose import wrapped
 
-__all__ = ["LaserLog"]
+__all__ = ["FULL_TURN", "LaserLog"]
+
+FULL_TURN = 2 * np.pi + 1e-6  # rad, and what rounding adds
+LEAST_RANGE = 1e-6  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +45,8 @@ class LaserLog:
     Raises
     ------
     ValueError
-        If shapes do not fit, a range is NaN, negative or finite beyond `max_range`, or times or
-        angles do not increase.
+        If shapes do not fit, a range is NaN, negative or finite beyond `max_range`, times or angles do
+        not increase, angles span more than a full turn, or a pose is beyond 1e9 m.
 
     Examples
     --------
@@ -52,18 +63,21 @@ class LaserLog:
     notes: tuple = ()
 
     def __post_init__(self):
-        t, angles = checked_array("t", self.t, "T"), checked_array("angles", self.angles, "B")
+        t = checked_array("t", self.t, "T", least=-LATEST, most=LATEST)
+        angles = checked_array("angles", self.angles, "B", least=-FULL_TURN, most=FULL_TURN)
         if 0 in (t.size, angles.size):
             raise ValueError(f"a log must hold a scan and a beam, got {t.size} and {angles.size}")
         ranges = checked_array("ranges", self.ranges, t.size, angles.size, finite=False)
-        poses = checked_array("poses", self.poses, t.size, 3)
+        poses = checked_positions("poses", self.poses, t.size, 3)
         poses[:, 2] = wrapped(poses[:, 2])
-        max_range = float(self.max_range)
+        max_range = checked_number("max_range", self.max_range, LEAST_RANGE)
         _check_increasing("t", t)
         _check_increasing("angles", angles)
-        check_positive("max_range", max_range)
+        if angles[-1] - angles[0] > FULL_TURN:
+            raise ValueError(f"angles must span a full turn at most, got {angles[-1] - angles[0]:g} rad")
         _check_ranges(ranges, max_range)
         put_in(self, t=t, ranges=ranges, angles=angles, poses=poses, max_range=max_range)
+        put_in(self, notes=checked_records("notes", self.notes, Note))
 
     def __len__(self):
         return len(self.t)

@@ -10,21 +10,38 @@ d = 2 dimensions.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import hypot
 
 import numpy as np
 
-from dollop.checks import checked_array
+from dollop.checks import (
+    checked_array,
+    checked_flag,
+    checked_number,
+    checked_positions,
+    checked_record,
+    checked_whole,
+    put_in,
+    told,
+)
 from dollop.pose import rotation
 from dollop.trajectory import check_trajectories, retime
 
-__all__ = ["DECAY", "LDS", "NOTHING", "STEPS", "Statistics", "dot", "powers_on"]
+__all__ = ["DECAY", "LDS", "MOST_STEPS", "NOTHING", "STEPS", "Statistics", "dot", "powers_on"]
 
 SHRINKAGE = 1e-3  # share of the mean variance that is added to every direction of G0
 STEPS, DECAY = 40, 3.0
 """A re-timed segment: its steps, and the time constants over which it decays."""
 
+MOST_STEPS = 100_000
+"""Steps of a response: one that keeps 0.9997 of its offset at each comes from 1e9 m to a micrometre
+in so many, and what is shown decays within some forty by e^3."""
+
 NOTHING = 1e-18
 """m^2: a squared length that counts as zero."""
+_MOST, _ROUNDING = 1e30, 1e-4
+"""m^2 that squared offsets within 1e9 m can sum up to; and share of them that rounding may have made, a
+fifth of what shrinkage adds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +53,11 @@ class Statistics:
     G0, G1 : (..., d, d) float arrays
         Sums of x[n] x[n]^T and of x[n+1] x[n]^T over all samples but the last, in m^2, x being the
         offset from the end.
+
+    Raises
+    ------
+    ValueError
+        Where they are not finite, not square, not of one shape, or larger than 1e30 m^2.
 
     Examples
     --------
@@ -49,6 +71,12 @@ class Statistics:
 
     G0: np.ndarray
     G1: np.ndarray
+
+    def __post_init__(self):
+        G0 = checked_array("G0", self.G0, "...", "d", "d", least=-_MOST, most=_MOST)
+        if G0.shape[-2] != G0.shape[-1]:
+            raise ValueError(f"G0 must be square, got shape {G0.shape}")
+        put_in(self, G0=G0, G1=checked_array("G1", self.G1, *G0.shape, least=-_MOST, most=_MOST))
 
     def __add__(self, other):
         return Statistics(self.G0 + other.G0, self.G1 + other.G1)
@@ -66,7 +94,15 @@ class Statistics:
         -------
         Statistics
             (..., d, d), m^2.
+
+        Raises
+        ------
+        ValueError
+            For what are no positions within 1e9 m, or none at all.
         """
+        samples = checked_positions("samples", samples, "...", "N", "d")
+        if not samples.shape[-2]:
+            raise ValueError(f"samples must hold one at least, got shape {samples.shape}")
         offsets = samples - samples[..., -1:, :]
         before = np.swapaxes(offsets[..., :-1, :], -1, -2)
         return cls(before @ offsets[..., :-1, :], np.swapaxes(before @ offsets[..., 1:, :], -1, -2))
@@ -112,17 +148,21 @@ class LDS:
     Raises
     ------
     ValueError
-        Statistics or a goal that are not finite or not of two dimensions, or statistics that no
-        trajectory has.
+        Statistics or a goal that are not finite or not of two dimensions, a goal beyond 1e9 m, or
+        statistics that no trajectory has.
     """
 
     statistics: Statistics
     goal: np.ndarray
 
     def __post_init__(self):
-        object.__setattr__(self, "goal", checked_array("goal", self.goal, 2))
-        checked_array("G0", self.statistics.G0, 2, 2)
-        checked_array("G1", self.statistics.G1, 2, 2)
+        put_in(self, goal=checked_positions("goal", self.goal, 2))
+        checked_record("statistics", self.statistics, Statistics)
+        (a, b), (c, d) = checked_array("G0", self.statistics.G0, 2, 2).tolist()
+        size = max(a + d, NOTHING)
+        least = (a + d) / 2 - hypot((a - d) / 2, b)
+        if abs(b - c) > _ROUNDING * size or least < -_ROUNDING * size:
+            raise ValueError(f"G0 must be a sum of x x^T, got {told([[a, b], [c, d]])}")
         radius = np.abs(np.linalg.eigvals(self.A)).max()
         if not radius < 1:
             raise ValueError(f"A must have a spectral radius below one, got {radius}")
@@ -169,7 +209,7 @@ class LDS:
         >>> bool(abs(np.linalg.eigvals(lds.A)).max() < 1)
         True
         """
-        walks = check_trajectories(trajectories)
+        walks, retimed = check_trajectories(trajectories), checked_flag("retimed", retimed)
         samples = [retime(walk, STEPS, DECAY) if retimed else walk for walk in walks]
         first, *others = map(Statistics.of, samples)
         return cls(sum(others, first), np.mean([walk[-1] for walk in walks], axis=0))
@@ -187,13 +227,18 @@ class LDS:
         LDS
             With the same subgoal.
 
+        Raises
+        ------
+        ValueError
+            For what is no angle.
+
         Examples
         --------
         >>> lds = LDS.fit([[0.0, 1.0], [1.0, 0.5], [2.0, 0.0]])
         >>> np.allclose(lds.turned(0.7).turned(-0.7).A, lds.A)
         True
         """
-        R = rotation(angle)
+        R = rotation(checked_number("angle", angle))
         G0, G1 = self.statistics.G0, self.statistics.G1
         return replace(self, statistics=Statistics(R @ G0 @ R.T, R @ G1 @ R.T))
 
@@ -213,7 +258,7 @@ class LDS:
         Raises
         ------
         ValueError
-            Not two finite numbers each.
+            Not two finite numbers each, within 1e9 m.
 
         Examples
         --------
@@ -223,7 +268,7 @@ class LDS:
         >>> lds.step([2.0, 0.0])
         array([2., 0.])
         """
-        return self.goal + (check_states(x) - self.goal) @ self.A.T
+        return self.goal + (checked_positions("a state", x, "...", 2) - self.goal) @ self.A.T
 
     def response(self, x0, n):
         """The states from a start on (Sec. III).
@@ -233,7 +278,7 @@ class LDS:
         x0 : (2,) array_like
             Start in m.
         n : int
-            Number of steps.
+            Number of steps, at most 100,000.
 
         Returns
         -------
@@ -243,7 +288,8 @@ class LDS:
         Raises
         ------
         ValueError
-            A start that is not two finite numbers, or a number of steps that is none.
+            A start that is not two finite numbers within 1e9 m, or a number of steps that is none or
+            too many.
 
         Examples
         --------
@@ -253,9 +299,8 @@ class LDS:
         >>> np.allclose(lds.response([-5.0, 7.0], 500)[-1], lds.goal)
         True
         """
-        if n != int(n) or n < 0:
-            raise ValueError(f"n must be a whole number of steps from 0 on, got {n}")
-        return self.goal + powers_on(self.A, check_states(x0) - self.goal, int(n))
+        n, start = checked_whole("n", n, 0, MOST_STEPS), checked_positions("a state", x0, 2)
+        return self.goal + powers_on(self.A, start - self.goal, n)
 
     def lyapunov(self, x):
         """Lyapunov function (x - g)^T G0^-1 (x - g), which never grows along a response.
@@ -273,7 +318,7 @@ class LDS:
         Raises
         ------
         ValueError
-            Not two finite numbers each.
+            Not two finite numbers each, within 1e9 m.
 
         Examples
         --------
@@ -281,16 +326,8 @@ class LDS:
         >>> bool((np.diff(lds.lyapunov(lds.response([-5.0, 7.0], 30))) <= 0).all())
         True
         """
-        offset = check_states(x) - self.goal
+        offset = checked_positions("a state", x, "...", 2) - self.goal
         return dot(offset, np.linalg.solve(self.statistics.regular[0], offset[..., None])[..., 0])
-
-
-def check_states(x):
-    """States as a float array (..., 2); ValueError if not finite or of another dimension."""
-    states = np.asarray(x, float)
-    if not states.ndim or states.shape[-1] != 2 or not np.isfinite(states).all():
-        raise ValueError(f"a state must be two finite numbers, got {x}")
-    return states
 
 
 def powers_on(A, x, n):

@@ -39,8 +39,19 @@ from math import pi
 import numpy as np
 import scipy
 
-from dollop.checks import Note, check_choice, check_positive
-from dollop.environment import corner_indices, integer_costs
+from dollop.checks import (
+    Note,
+    check_choice,
+    checked_array,
+    checked_flag,
+    checked_number,
+    checked_record,
+    checked_whole,
+    checked_wholes,
+    put_in,
+    told,
+)
+from dollop.environment import Environment, corner_indices, integer_costs
 from dollop.gridmap import covered_cells
 
 __all__ = ["SURE", "Matching", "match", "match_surely"]
@@ -64,6 +75,7 @@ _KAPPA = 1.0  # of the turns, von Mises: small ones are a little likelier
 _NARROWEST = 5.0  # m, side of a room
 _WHERETO = np.linspace(-2, 2, 9)  # standard deviations by which an object may have been moved
 
+MOST_OBJECTS = 500
 _EXACT = 12  # up to so many objects all matchings are summed
 _STARTS = 8  # so many of the alignments that fit best are refined, in so many steps
 _STEPS = 6
@@ -73,6 +85,10 @@ _NEVER = 1e6  # nats
 _PROBES = 25  # by so many objects at most it is judged how well an alignment fits
 _BELIEFS = 200  # steps of belief propagation at most
 _RARE = 1e-3  # pairs less probable than this connect nothing
+
+_MOVES = 1e-3, 1e3  # m
+_MOST_OBJECTS = 10_000  # numbers of objects are below: all pairs are held at once
+_CERTAIN = 1 + 1e-6  # a probability that is a sum may exceed 1 by rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +117,12 @@ class Matching:
     pair_probabilities : (N, M + 1) array
         How probable it is that object a of i is object b of j; in the last column, that it is none
         of them. None with the literal method.
+
+    Raises
+    ------
+    ValueError
+        Numbers that are none of corners, or of which one is twice, a cost or margin that is none, or
+        probabilities beyond 0 and 1.
     """
 
     indices: np.ndarray
@@ -110,6 +132,35 @@ class Matching:
     turn: float = 0.0
     probability: float = np.nan
     pair_probabilities: np.ndarray = None
+
+    def __post_init__(self):
+        indices = checked_wholes("indices", self.indices, "C", least=-1)
+        if len(indices) % 4:
+            raise ValueError(f"indices must be four for each object, got {len(indices)}")
+        taken = np.sort(indices[indices >= 0])
+        if (taken[1:] == taken[:-1]).any():
+            raise ValueError(f"a matching must not send two corners to one, got {told(indices.tolist())}")
+        put_in(self, indices=indices, confident=checked_flag("confident", self.confident))
+        most = float(np.finfo(float).max)
+        put_in(
+            self,
+            cost=checked_number("cost", self.cost, 1 - _CERTAIN, most),
+            turn=checked_number("turn", self.turn),
+        )
+        put_in(self, margin=checked_number("margin", self.margin, 1 - _CERTAIN, np.inf))
+        self._check_probabilities()
+
+    def _check_probabilities(self):
+        """Probabilities are 0 to 1; those of pairs (N, M + 1) are of all partners."""
+        if not (isinstance(self.probability, float) and np.isnan(self.probability)):
+            put_in(self, probability=checked_number("probability", self.probability, 0, _CERTAIN))
+        if self.pair_probabilities is not None:
+            n, highest = len(self.partners), self.partners.max(initial=-1)
+            shares = checked_array("pair_probabilities", self.pair_probabilities, n, "M + 1", least=0, most=_CERTAIN)
+            if n and highest >= shares.shape[1] - 1:
+                rule = f"pair_probabilities must be of all partners, up to {highest}"
+                raise ValueError(f"{rule}, got those of {shares.shape[1] - 1} objects")
+            put_in(self, pair_probabilities=shares)
 
     def __repr__(self):
         told = ", ".join(map(self._told, range(len(self.partners)))) or "none"
@@ -128,8 +179,13 @@ class Matching:
         Returns
         -------
         Matching
+
+        Raises
+        ------
+        ValueError
+            For what is no number of objects, or more than 10,000.
         """
-        return cls.of_partners(np.arange(n))
+        return cls.of_partners(np.arange(checked_whole("n", n, 0, _MOST_OBJECTS)))
 
     @classmethod
     def of_partners(cls, partners, turn=0.0):
@@ -156,14 +212,14 @@ class Matching:
         >>> Matching.of_partners([1, -1, 0])
         Matching of objects 0 to 1, 1 gone, 2 to 0: confident, as a whole 100 %
         """
-        given = np.array(partners, dtype=float).reshape(-1)
-        partners = given.astype(int)
+        partners = checked_wholes("partners", partners, "N", least=-1, most=_MOST_OBJECTS)
         taken = np.sort(partners[partners >= 0])
-        if (partners != given).any() or (partners < -1).any() or (taken[1:] == taken[:-1]).any():
-            rule = "partners must be numbers of objects, none twice, or -1"
-            raise ValueError(f"{rule}, got {given.tolist()}")
-        told = np.eye(taken.max(initial=-1) + 2)[partners]  # -1 is the last column
-        return cls(corner_indices(partners, turn), 0.0, np.inf, True, float(turn), 1.0, told)
+        if (taken[1:] == taken[:-1]).any():
+            raise ValueError(f"partners must be numbers of objects, none twice, or -1, got {told(partners.tolist())}")
+        turn = checked_number("turn", turn)
+        sure = np.zeros((len(partners), taken.max(initial=-1) + 2))
+        sure[np.arange(len(partners)), partners] = 1.0  # -1 is the last column
+        return cls(corner_indices(partners, turn), 0.0, np.inf, True, turn, 1.0, sure)
 
     @property
     def partners(self):
@@ -210,7 +266,8 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     Parameters
     ----------
     environment_i, environment_j : Environment
-        Any number of objects. With "literal" at least two each.
+        At most 500 objects each: matching them takes some seconds and 700 MB. With "literal" at
+        least two each.
     method : {"robust", "literal"}
         "robust" compares the layouts and the sizes of the objects, knows what could be seen, and
         takes the corners from that; objects may be missing, added or split. "literal" is the
@@ -227,6 +284,7 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     Raises
     ------
     ValueError
+        What is no Environment, more than 500 objects; moves below a millimetre or beyond a kilometre.
         With "literal": fewer than two objects, different counts, or corners that coincide.
 
     Examples
@@ -244,7 +302,12 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     [-1]
     """
     check_choice("method", method, ("robust", "literal"))
-    check_positive("moved", moved)
+    moved = checked_number("moved", moved, *_MOVES)
+    checked_record("environment_i", environment_i, Environment)
+    checked_record("environment_j", environment_j, Environment)
+    most = max(len(environment_i), len(environment_j))
+    if most > MOST_OBJECTS:
+        raise ValueError(f"environments to match must have at most {MOST_OBJECTS} objects, got {most}")
     if method == "robust":
         return _match_robustly(environment_i, environment_j, moved)
     counts = f"{len(environment_i)} and {len(environment_j)}"
@@ -276,7 +339,7 @@ def match_surely(environment_i, environment_j, names):
     Raises
     ------
     ValueError
-        Where nothing is sure of any object: then ask the user, do not guess.
+        What is no Environment; or where nothing is sure of any object: then ask the user, do not guess.
 
     Examples
     --------
@@ -291,6 +354,8 @@ def match_surely(environment_i, environment_j, names):
     Traceback (most recent call last):
     ValueError: before and after cannot be matched with confidence: ...
     """
+    for name, environment in zip(names, (environment_i, environment_j), strict=True):
+        checked_record(name, environment, Environment)
     if np.array_equal(environment_i.boxes, environment_j.boxes):
         return Matching.identity(len(environment_i)), ()
     matching = match(environment_i, environment_j)

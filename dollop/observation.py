@@ -5,7 +5,22 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from dollop.checks import Note, check_choice, check_positive, checked_array, checked_number, trusted
+from dollop.checks import (
+    FARTHEST,
+    LATEST,
+    Note,
+    check_choice,
+    check_positive,
+    checked_array,
+    checked_number,
+    checked_positions,
+    checked_record,
+    checked_records,
+    checked_whole,
+    put_in,
+    shortened,
+    trusted,
+)
 from dollop.environment import Environment, Seen, standing_boxes
 from dollop.foreground import (
     ForegroundGrid,
@@ -19,6 +34,7 @@ from dollop.foreground import (
     surface_points,
 )
 from dollop.gridmap import OccupancyGrid, flat_cells, in_cells
+from dollop.laser import FULL_TURN, LaserLog
 from dollop.people import (
     BRIDGED,
     MOVED,
@@ -112,6 +128,11 @@ class Observation:
         the same person.
     notes : tuple of Note
         What may be wrong, and why.
+
+    Raises
+    ------
+    ValueError
+        For a field that is not of its kind.
     """
 
     tracks: tuple
@@ -120,6 +141,18 @@ class Observation:
     losses: int
     people: tuple = ()
     notes: tuple = ()
+
+    def __post_init__(self):
+        if self.user is not None:
+            checked_record("user", self.user, Track)
+        put_in(
+            self,
+            tracks=checked_records("tracks", self.tracks, Track),
+            environment=checked_record("environment", self.environment, Environment),
+            losses=checked_whole("losses", self.losses),
+            people=checked_records("people", self.people, Track),
+            notes=checked_records("notes", self.notes, Note),
+        )
 
     @property
     def trusted(self):
@@ -164,10 +197,11 @@ def observe(log, background, user="fastest", method="people", background_radius=
         its range.
     """
     check_choice("method", method, METHODS)
+    checked_record("log", log, LaserLog)
     if method == "paper":
         return observe_as_paper(log, background, background_radius, min_area=min_area, **paper)
     if paper:
-        raise ValueError(f'{", ".join(paper)} must come with method="paper"')
+        raise ValueError(f'{shortened(", ".join(paper), 99)} must come with method="paper"')
     observer = Observer(background, log.angles, user, background_radius, min_area)
     observer._take_all(log.t, log.ranges, log.poses)
     return observer.observation(log.notes)
@@ -194,14 +228,13 @@ class Observer:
     """
 
     def __init__(self, background, angles, user="fastest", background_radius=0.20, min_area=0.01):
-        if not isinstance(background, OccupancyGrid):
-            raise ValueError(f"background must be an OccupancyGrid, got {background!r:.60}")
+        checked_record("background", background, OccupancyGrid)
         checked_number("the background's resolution", background.resolution, *RESOLUTIONS)
         check_positive("background_radius", checked_number("background_radius", background_radius))
         check_positive("min_area", checked_number("min_area", min_area), or_zero=True)
         self.background, self.user, self.min_area = background, checked_user(user), min_area
-        angles = checked_array("angles", angles, "B")
-        if not angles.size or not (np.diff(angles) > 0).all() or np.ptp(angles) > 2 * np.pi + 1e-6:
+        angles = checked_array("angles", angles, "B", least=-FULL_TURN, most=FULL_TURN)
+        if not angles.size or not (np.diff(angles) > 0).all() or np.ptp(angles) > FULL_TURN:
             rule = "angles must increase, from one beam on, over at most a full turn"
             ends = f"{angles[0]:g} to {angles[-1]:g} rad" if angles.size else "none"
             raise ValueError(f"{rule}, got {ends}")
@@ -237,9 +270,7 @@ class Observer:
         ranges = checked_array("ranges", ranges, len(self.angles), finite=False)
         if not (ranges >= 0).all():
             raise ValueError(f"a range must not be negative or NaN, got {ranges[~(ranges >= 0)][0]}")
-        pose = checked_array("pose", pose, 3)
-        if isinstance(t, bool) or not isinstance(t, int | float | np.number) or not np.isfinite(t):
-            raise ValueError(f"t must be a finite number of s, got {t!r:.60}")
+        pose, t = checked_positions("pose", pose, 3), checked_number("t", t, -LATEST, LATEST)
         if self.followed.t and t <= self.followed.t[-1]:
             raise ValueError(f"t must be later than the last scan's {self.followed.t[-1]}, got {t}")
         self._take_all(np.array([t]), ranges[None], pose[None])
@@ -355,15 +386,7 @@ class Observer:
 
     def _map_notes(self):
         """Whether the map explains the scans, and whether they are often enough."""
-        period = float(np.median(np.diff(self.followed.t))) if len(self.followed.t) > 1 else 0.0
-        if period > SLOWEST:
-            yield Note(
-                "slow scans",
-                f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s",
-            )
-        pause = float(np.diff(self.followed.t).max(initial=0.0))
-        if pause > max(LONGEST_PAUSE, 3 * period):
-            yield Note("pause", f"there is no scan for {pause:.4g} s: nobody is followed through that")
+        yield from _clock_notes(self.followed.t)
         share = self.through / max(self.in_view, 1)
         if share > MOST_THROUGH:
             text = f"beams go through {share:.0%} of what the map has in view (at most {MOST_THROUGH:.0%})"
@@ -418,6 +441,17 @@ class Observer:
         if np.median(self.floor.first_at(places)) < since - 0.5 and not (gone[before, 4] < since - 0.5).any():
             return float(since)
         return self.followed.t[0]
+
+
+def _clock_notes(t):
+    """Whether scans at times (T,) in s are often enough, and none is far from the one before."""
+    period = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    if period > SLOWEST:
+        text = f"a scan comes every {period:.2g} s: people are followed up to {SLOWEST:g} s"
+        yield Note("slow scans", text)
+    pause = float(np.diff(t).max(initial=0.0))
+    if pause > max(LONGEST_PAUSE, 3 * period):
+        yield Note("pause", f"there is no scan for {pause:.4g} s: nobody is followed through that")
 
 
 def part_note(place):
@@ -507,7 +541,7 @@ def checked_user(user):
         return user
     if isinstance(user, int | np.integer) and not isinstance(user, bool):
         return int(user)
-    return checked_array("user", user, 2)
+    return checked_positions("user", user, 2)
 
 
 def walks(track):
@@ -566,7 +600,8 @@ def user_notes(user, person, people, tracks, choice, background, now):
         )
     for when in beside(user, others=[who for who in tracks if who is not user]):
         yield Note(
-            "exchange", f"{when - user.t[0]:.1f} s after the user was first seen a track beside them begins or ends"
+            "exchange",
+            f"{when - user.t[0]:.1f} s after the user was first seen a track beside them begins or ends",
         )
         break
     left = now - user.t[-1]
@@ -668,9 +703,12 @@ def observe_as_paper(
     ValueError
         If the map does not cover the scans or a parameter is out of its range.
     """
-    check_positive("min_area", min_area, or_zero=True)
-    check_positive("stride", stride, or_zero=True)
-    tracker = tracker or Tracker()
+    checked_record("log", log, LaserLog)
+    checked_record("background", background, OccupancyGrid)
+    checked_number("background_radius", background_radius, 1 / FARTHEST)
+    checked_number("min_area", min_area, 0)
+    checked_number("stride", stride, 0)
+    tracker = Tracker() if tracker is None else checked_record("tracker", tracker, Tracker)
     moving, static = ForegroundGrid(background, gain), ForegroundGrid(background, static_gain)
     objects = []
     for i, hits in enumerate(foreground_hits(log, background, background_radius)):
@@ -688,7 +726,8 @@ def observe_as_paper(
     user = user_track(log.t, tracks, users, tracker.motion)
     boxes = static_boxes(static, log.poses[-1, :2], user, min_area)
     losses = max(0, np.count_nonzero(np.diff(users, prepend=-1)) - 1)
-    return Observation(tracks, user, Environment(boxes), losses)
+    notes = (*log.notes, *_clock_notes(log.t))
+    return Observation(tracks, user, Environment(boxes), losses, notes=notes)
 
 
 def foreground_hits(log, background, background_radius=0.20):

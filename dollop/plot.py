@@ -16,6 +16,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Circle, Ellipse, Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 
+from dollop.checks import checked_array, checked_number, checked_positions, checked_whole
 from dollop.foreground import endpoints
 from dollop.trajectory import arc_length
 
@@ -168,7 +169,8 @@ def boxes(ax, boxes, label=None, colour=OBSTACLE, **look):
         Options of `matplotlib.patches.Rectangle`.
     """
     look = {"fill": False, "edgecolor": colour, "linewidth": 2, "label": label} | look
-    for x0, y0, x1, y1 in boxes:
+    none = isinstance(boxes, list | tuple | np.ndarray) and len(boxes) == 0
+    for x0, y0, x1, y1 in () if none else checked_positions("boxes", boxes, "N", 4):
         ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **look))
         look["label"] = None
 
@@ -185,7 +187,7 @@ def robot(ax, pose, radius=_RIM, label=None):
         In m.
     label : str, optional
     """
-    x, y, theta = pose
+    (x, y, theta), radius = checked_positions("pose", pose, 3), checked_number("radius", radius, 0)
     ax.add_patch(Circle((x, y), radius, facecolor=_ROBOT, edgecolor="black", zorder=4))
     ax.plot([], [], "o", color=_ROBOT, markeredgecolor="black", markersize=10, label=label)
     ahead = [x, x + radius * np.cos(theta)], [y, y + radius * np.sin(theta)]
@@ -240,6 +242,7 @@ def scan(ax, log, i, label="laser scan"):
         Which of its scans.
     label : str, optional
     """
+    i = checked_whole("i, of the scans,", i, 1 - len(log), len(log) - 1)
     x, y, _ = log.poses[i]
     xs, ys = endpoints(log)[i, np.isfinite(log.ranges[i])].T
     rays = np.stack([np.full_like(xs, x), xs]), np.stack([np.full_like(ys, y), ys])
@@ -260,7 +263,10 @@ def path(ax, positions, label=None, colour=USER, **look):
     **look
         Options of `Axes.plot`.
     """
-    ax.plot(*np.asarray(positions).T[:2], color=colour, label=label, **({"linewidth": 1} | look))
+    positions = checked_array("positions", positions, "N", "d", finite=False)
+    if positions.shape[1] not in (2, 3):
+        raise ValueError(f"positions must be of 2 or 3 columns, got {positions.shape[1]}")
+    ax.plot(*positions.T[:2], color=colour, label=label, **({"linewidth": 1} | look))
 
 
 def track(ax, track, label="track", **look):
@@ -290,7 +296,7 @@ def subgoals(ax, subgoals, label="subgoals"):
     label : str, optional
     """
     look = {"color": SUBGOAL, "markersize": 9, "markeredgewidth": 2.5, "zorder": 6}
-    ax.plot(*np.asarray(subgoals).T, "x", label=label, **look)
+    ax.plot(*checked_positions("subgoals", subgoals).T, "x", label=label, **look)
 
 
 def law(ax, response, label="control law", **look):
@@ -305,7 +311,7 @@ def law(ax, response, label="control law", **look):
     **look
         Options of `path`.
     """
-    response, look = np.asarray(response), {"linewidth": 2, "colour": LAW} | look
+    response, look = checked_positions("response", response), {"linewidth": 2, "colour": LAW} | look
     path(ax, response, label, **look)
     walked = arc_length(response)
     head = {"mutation_scale": 18, "color": look["colour"], "linewidth": 0}

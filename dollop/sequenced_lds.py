@@ -5,10 +5,28 @@ from functools import cached_property
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_array
-from dollop.law.line import lines_of
-from dollop.law.timing import CORNER, Stands, shown_pauses, shown_profile, times_along, turns_at
-from dollop.lds import LDS, Statistics
+from dollop.checks import (
+    check_choice,
+    checked_array,
+    checked_flag,
+    checked_flags,
+    checked_number,
+    checked_positions,
+    checked_records,
+    checked_whole,
+    put_in,
+)
+from dollop.law.line import check_ends, lines_of
+from dollop.law.timing import (
+    CORNER,
+    SOONEST,
+    Stands,
+    shown_pauses,
+    shown_profile,
+    times_along,
+    turns_at,
+)
+from dollop.lds import LDS, MOST_STEPS, Statistics
 from dollop.segmentation import (
     best_segments,
     cuts_within,
@@ -27,13 +45,18 @@ from dollop.trajectory import (
     resample,
 )
 
-__all__ = ["SequencedLDS"]
+__all__ = ["LEAST_REACH", "PERIODS", "SequencedLDS", "check_times"]
 
 LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none would ever arrive
 REACH = 0.01  # m, to which lines are rolled out
 TURNED = np.radians(10)  # over two decimetres: on a radius of 1.1 m, which is no corner
 ROUNDS = 8  # how often a walk is divided anew: nearly always two are enough
 MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
+SPEEDS = 1e-24, 1e24  # m/s: no walk within 1e9 m shows others, by whatever clock
+PERIODS = 1e-6, 1e6  # s
+LONGEST_PAUSE = 1e11  # s
+MOST_TIMES = 1_000_000
+"""Times of a response: more than a day, ten times a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +81,12 @@ class SequencedLDS:
     corners : (K,) bool array, optional
         Whether a corner was shown at each subgoal, or a stop; elsewhere the direction of the
         response is continuous. By default there is none.
+
+    Raises
+    ------
+    ValueError
+        No segments, a start beyond 1e9 m, speeds that are not positive, pauses that are negative, or
+        another number of them than of segments.
     """
 
     segments: tuple
@@ -66,6 +95,30 @@ class SequencedLDS:
     profile: np.ndarray | None = None
     pauses: np.ndarray | None = None
     corners: np.ndarray | None = None
+
+    def __post_init__(self):
+        segments = checked_records("segments", self.segments, LDS)
+        if not segments:
+            raise ValueError("a law must have a segment, got none")
+        least, most = SPEEDS
+        put_in(
+            self,
+            segments=segments,
+            start=checked_positions("start", self.start, 2),
+            speeds=checked_array("speeds", self.speeds, len(segments), least=least, most=most),
+        )
+        if self.profile is not None:
+            put_in(
+                self,
+                profile=checked_array("profile", self.profile, len(segments), "M", least=0, most=most),
+            )
+        if self.pauses is not None:
+            put_in(
+                self,
+                pauses=checked_array("pauses", self.pauses, len(segments) + 1, least=0, most=LONGEST_PAUSE),
+            )
+        if self.corners is not None:
+            put_in(self, corners=checked_flags("corners", self.corners, len(segments)))
 
     def __repr__(self):
         ends = self.start, self.subgoals[-1]
@@ -138,7 +191,9 @@ class SequencedLDS:
         >>> len(law.segments), law.subgoals.round(6) + 0.0
         (1, array([[0., 1.]]))
         """
-        check_search(tolerance, n_segments, sample_period, candidates)
+        given = tolerance, n_segments, sample_period, candidates
+        tolerance, n_segments, sample_period, candidates = checked_search(*given)
+        retimed = checked_flag("retimed", retimed)
         stands = [Stands.of(walk, sample_period) for walk in check_trajectories(trajectories)]
         walks = [each.walk for each in stands]
         aligned, shares = align(walks, 2 * candidates - 1)
@@ -191,7 +246,13 @@ class SequencedLDS:
         Returns
         -------
         list of K Line
+
+        Raises
+        ------
+        ValueError
+            Too small a reach.
         """
+        reach = checked_number("reach", reach, LEAST_REACH)
         corners = np.zeros(len(self.segments), bool) if self.corners is None else self.corners
         return lines_of(self.segments, self.start, corners, reach)
 
@@ -223,7 +284,8 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            A start that is no position, too small a reach, another method or segment.
+            A start that is no position, too small a reach, another method or segment, or a response
+            that is not within reach of a subgoal after 100,000 steps.
 
         Examples
         --------
@@ -271,14 +333,12 @@ class SequencedLDS:
         >>> np.allclose(ends, law.subgoals)
         True
         """
-        if not reach >= LEAST_REACH:
-            raise ValueError(f"reach must be at least {LEAST_REACH:g} m, got {reach}")
+        reach = checked_number("reach", reach, LEAST_REACH)
         check_choice("method", method, ("held", "paper"))
-        if segment not in range(len(self.segments)):
-            raise ValueError(f"segment must be 0 to {len(self.segments) - 1}, got {segment}")
+        segment = checked_whole("segment", segment, 0, len(self.segments) - 1)
         if start is None:
             start = np.vstack([self.start, self.subgoals])[segment]
-        place = checked_array("start", start, 2)
+        place = checked_positions("start", start, 2)
         parts = (self._held if method == "held" else self._alone)(place, reach, segment)
         return [part[1:] if k else part for k, part in enumerate(parts)]
 
@@ -297,7 +357,10 @@ class SequencedLDS:
         for each in self.segments[segment:]:
             states = [place]
             while np.linalg.norm(states[-1] - each.goal) > reach:
+                check_ends(len(states), each.goal, reach)
                 states.append(each.step(states[-1]))
+                if (states[-1] == states[-2]).all():  # no nearer in floating point
+                    check_ends(MOST_STEPS, each.goal, reach)
             parts.append(np.array(states))
             place = states[-1]
         return parts
@@ -322,7 +385,7 @@ class SequencedLDS:
         Raises
         ------
         ValueError
-            A period that is not positive.
+            A period that is not positive, or that makes more than a million times.
 
         Examples
         --------
@@ -334,10 +397,11 @@ class SequencedLDS:
         >>> bool(np.abs(positions[:, 0] - x[: len(t)]).max() < 0.05), float(t[-1].round(1))
         (True, 4.5)
         """
-        check_positive("period", period)
-        speeds = np.asarray(self.speeds, float)[:, None] if self.profile is None else self.profile
+        period = checked_number("period", period, *PERIODS)
+        speeds = self.speeds[:, None] if self.profile is None else self.profile
         pauses = np.zeros(len(self.segments) + 1) if self.pauses is None else self.pauses
         when, places = times_along([line.places for line in self.lines()], speeds, pauses)
+        check_times(when[-1], period)
         t = period * np.arange(int(np.ceil(when[-1] / period - 1e-9)) + 1)
         return t, np.stack([np.interp(t, when, column) for column in places.T], axis=1)
 
@@ -429,14 +493,40 @@ class SequencedLDS:
         >>> np.allclose(moved.response(), law.response() + [3.0, 0.0])
         True
         """
-        goals = checked_array("subgoals", subgoals, len(self.segments), 2)
-        start = checked_array("start", self.start if start is None else start, 2)
+        goals = checked_positions("subgoals", subgoals, len(self.segments), 2)
+        start = checked_positions("start", self.start if start is None else start, 2)
         segments = self.segments
-        if turned:
+        if checked_flag("turned", turned):
             turns = chord_angles(start, goals) - chord_angles(self.start, self.subgoals)
             segments = map(LDS.turned, segments, turns)
         moved = [replace(segment, goal=goal) for segment, goal in zip(segments, goals, strict=True)]
         return replace(self, segments=tuple(moved), start=start)
+
+
+def check_times(lasting, period):
+    """Refuse what lasts longer than a million periods.
+
+    Parameters
+    ----------
+    lasting : float
+        s.
+    period : float
+        s.
+
+    Raises
+    ------
+    ValueError
+        The message names both: either the period is wrong, or a pause is one of the clock's.
+
+    Examples
+    --------
+    >>> check_times(1.7e9, 0.1)
+    Traceback (most recent call last):
+    ValueError: what is driven must last at most 1000000 periods, got 1.7e+09 s at a period of 0.1 s
+    """
+    if not lasting <= (MOST_TIMES - 1) * period:
+        rule = f"what is driven must last at most {MOST_TIMES} periods"
+        raise ValueError(f"{rule}, got {lasting:.6g} s at a period of {period:g} s")
 
 
 def chord_angles(start, subgoals):
@@ -445,17 +535,14 @@ def chord_angles(start, subgoals):
     return np.arctan2(chords[:, 1], chords[:, 0])
 
 
-def check_search(tolerance, n_segments, sample_period, candidates):
-    """Raise ValueError for a parameter of `SequencedLDS.fit` that is out of its range."""
-    if not tolerance > 0:
-        raise ValueError(f"tolerance must be positive, got {tolerance}")
-    check_positive("sample_period", sample_period)
-    if not 3 <= candidates <= MOST_CANDIDATES:
-        raise ValueError(f"candidates must be 3 to {MOST_CANDIDATES}, got {candidates}")
-    most = (candidates - 1) // 2
-    if n_segments is not None and n_segments not in range(1, most + 1):
-        rule = f"n_segments must be a whole number from 1 to {most} (half the candidates)"
-        raise ValueError(f"{rule}, got {n_segments}")
+def checked_search(tolerance, n_segments, sample_period, candidates):
+    """The parameters of `SequencedLDS.fit`; ValueError for one that is out of its range."""
+    tolerance = checked_number("tolerance", tolerance, LEAST_REACH)
+    sample_period = checked_number("sample_period", sample_period, *PERIODS)
+    candidates = checked_whole("candidates", candidates, 3, MOST_CANDIDATES)
+    if n_segments is not None:  # each of them takes two candidates
+        n_segments = checked_whole("n_segments", n_segments, 1, (candidates - 1) // 2)
+    return tolerance, n_segments, sample_period, candidates
 
 
 @dataclass(frozen=True, eq=False)
@@ -592,5 +679,5 @@ def demonstrated_speeds(walks, moments, sample_period):
     """Mean speed (S,) in m/s between fractional sample numbers (K, S + 1), over all walks."""
     pairs = zip(moments, map(arc_length, walks), strict=True)
     walked = [np.interp(moment, np.arange(len(w)), w) for moment, w in pairs]
-    taken = np.maximum(np.diff(moments, axis=1).sum(axis=0), np.finfo(float).tiny)
+    taken = np.maximum(np.diff(moments, axis=1).sum(axis=0), SOONEST)
     return np.diff(walked, axis=1).sum(axis=0) / (taken * sample_period)

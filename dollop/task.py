@@ -7,17 +7,31 @@ from functools import cached_property
 import numpy as np
 
 from dollop.association import Association, associate, layout_turn
-from dollop.checks import Note, check_choice, put_in, trusted
+from dollop.cdhmm import SubgoalHMM
+from dollop.checks import (
+    Note,
+    check_choice,
+    check_has,
+    checked_flag,
+    checked_number,
+    checked_record,
+    checked_records,
+    checked_wholes,
+    put_in,
+    trusted,
+)
 from dollop.environment import Environment
+from dollop.formats.kinds import TASK
 from dollop.formats.writing import whole_file
 from dollop.laps import cut_laps
 from dollop.learning.anchored import learn_anchored, tied_to_corners, told_of_places
 from dollop.learning.matchings import composed, inverse, matched_to, matchings_into, notes_of
 from dollop.learning.paper import anchors, learn_as_paper
 from dollop.learning.saving import as_dict, read_task
+from dollop.learning.way import Way
 from dollop.matching import Matching
-from dollop.sequenced_lds import SequencedLDS
-from dollop.trajectory import check_trajectories, ways_apart
+from dollop.sequenced_lds import LEAST_REACH, PERIODS, SequencedLDS
+from dollop.trajectory import check_trajectories, is_one, ways_apart
 
 __all__ = ["Demonstration", "Task", "learn"]
 
@@ -30,7 +44,7 @@ class Demonstration:
     ----------
     trajectory : (N, 2) float array, or list of (N_k, 2) float arrays
         The walk in m; several walks of the same task in the same environment, such as laps, are one
-        demonstration.
+        demonstration. Kept as read-only copies.
     environment : Environment
         The static foreground objects.
     sample_period : float
@@ -43,7 +57,8 @@ class Demonstration:
     Raises
     ------
     ValueError
-        For what is no trajectory.
+        For what is no trajectory, no Environment, a sample period or tolerance out of its range (a
+        microsecond to a million seconds; from a micrometre on), or what is no Note.
     """
 
     trajectory: np.ndarray
@@ -53,7 +68,17 @@ class Demonstration:
     notes: tuple = ()
 
     def __post_init__(self):
-        check_trajectories(self.trajectory)
+        one, walks = is_one(self.trajectory), check_trajectories(self.trajectory)
+        for walk in walks:
+            walk.flags.writeable = False
+        put_in(
+            self,
+            trajectory=walks[0] if one else walks,
+            environment=checked_record("environment", self.environment, Environment),
+            sample_period=checked_number("sample_period", self.sample_period, *PERIODS),
+            tolerance=checked_number("tolerance", self.tolerance, LEAST_REACH),
+            notes=checked_records("notes", self.notes, Note),
+        )
 
     def __repr__(self):
         return f"Demonstration, walked {len(self.walks)} x; {self.environment}"
@@ -81,8 +106,10 @@ class Demonstration:
         ValueError
             If nobody moved.
         """
+        check_has("observation", observation, "user", "environment")
         if observation.user is None:
             raise ValueError("a demonstration needs a user, but nobody moved")
+        check_has("the user of an observation", observation.user, "t", "positions")
         t, positions = observation.user.t, observation.user.positions
         cut, period = cut_laps(t, positions), float(np.median(np.diff(t)))
         walks, told = _of_one_way(cut.laps)
@@ -144,6 +171,11 @@ class Task:
         Which object of the environment each of those is, -1 where it is gone.
     learned : tuple of Way
         The ways as they were learned; none where the task was learned by method "paper".
+
+    Raises
+    ------
+    ValueError
+        A field that is not of its kind, or counts of places, ways or objects that contradict each other.
     """
 
     law: SequencedLDS
@@ -159,9 +191,29 @@ class Task:
     learned: tuple = ()
 
     def __post_init__(self):
-        objects = np.arange(len(self.environment)) if self.objects is None else self.objects
-        shown = self.shown or (len(self.demonstrations),)
-        put_in(self, ways=self.ways or (self.law,), shown=shown, objects=objects)
+        law = checked_record("law", self.law, SequencedLDS)
+        count = len(checked_record("environment", self.environment, Environment))
+        places = len(checked_record("association", self.association, Association).corners)
+        if places != len(law.segments) + 1:
+            rule = f"the association must be of the start and {len(law.segments)} subgoals"
+            raise ValueError(f"{rule}, got {places} places")
+        if self.model is not None:
+            checked_record("model", self.model, SubgoalHMM)
+        shown = checked_records("demonstrations", self.demonstrations, Demonstration)
+        ways = checked_records("ways", self.ways, SequencedLDS) or (law,)
+        objects = np.arange(count) if self.objects is None else self.objects
+        objects = checked_wholes("objects", objects, "N", least=-1, most=count - 1)
+        counts = self.shown if np.size(self.shown) else (len(shown),)
+        put_in(
+            self,
+            demonstrations=shown,
+            notes=checked_records("notes", self.notes, Note),
+            ways=ways,
+            shown=tuple(checked_wholes("shown", counts, len(ways)).tolist()),
+            partners=checked_partners(self.partners, shown, len(objects)),
+            objects=objects,
+            learned=checked_records("learned", self.learned, Way),
+        )
 
     def __repr__(self):
         shown, subgoals = len(self.demonstrations), len(self.law.segments)
@@ -210,6 +262,7 @@ class Task:
         True
         """
         check_choice("method", method, METHODS)
+        checked_record("demonstration", demonstration, Demonstration)
         environment, shown = demonstration.environment, (demonstration,)
         partners = (np.arange(len(environment)),)
         if method == "paper":
@@ -217,17 +270,8 @@ class Task:
             tied = associate(anchors(law), environment, m=max(1, len(environment.corners)))
             return cls(law, environment, tied, None, shown, notes_of(shown), partners=partners)
         ways, _, notes = learn_anchored(shown, partners, environment, merged=False)
-        blank = cls(
-            None,
-            environment,
-            None,
-            None,
-            shown,
-            (*notes_of(shown), *notes),
-            partners=partners,
-            learned=ways,
-        )
-        return _laid_out(blank, environment, blank.objects)
+        known = {"demonstrations": shown, "notes": (*notes_of(shown), *notes), "partners": partners}
+        return _laid_out(known | {"learned": ways}, environment, np.arange(len(environment)))
 
     def add(self, demonstration, spread=None, matching=None):
         """The task learned from all demonstrations so far and one more (Sec. V).
@@ -250,6 +294,7 @@ class Task:
         ValueError
             As `learn`.
         """
+        checked_record("demonstration", demonstration, Demonstration)
         known = [None if goes is None else Matching.of_partners(composed(goes, self.objects)) for goes in self.partners]
         known += [None] * (len(self.demonstrations) - len(known))
         shown, method = (
@@ -284,10 +329,10 @@ class Task:
             If no object can be matched with confidence, if a given matching belongs to others, or
             if a place follows nothing that is left.
         """
-        names = "the task's environment", "the new one"
+        names, turned = ("the task's environment", "the new one"), checked_flag("turned", turned)
         matching, notes = matched_to(self.environment, environment, matching, names)
         objects = composed(self.objects, matching.partners)
-        told = tuple(dict.fromkeys((*self.notes, *notes)))
+        notes = tuple(dict.fromkeys((*self.notes, *notes)))
         if not self.learned:
             start, *subgoals = self.association.relocate(environment, matching, turned)
             law = self.law.with_subgoals(subgoals, start, turned)
@@ -297,12 +342,13 @@ class Task:
                 law=law,
                 environment=environment,
                 association=tied,
-                notes=told,
+                notes=notes,
                 ways=(law,),
                 objects=objects,
             )
         turn = layout_turn_of(self.environment, environment, matching) if turned else 0.0
-        return _laid_out(replace(self, notes=told), environment, objects, turn)
+        known = {name: getattr(self, name) for name in ("model", "demonstrations", "partners", "learned")}
+        return _laid_out(known | {"notes": notes}, environment, objects, turn)
 
     def errors(self):
         """How far the task is from what each demonstration showed, in its own environment.
@@ -344,9 +390,9 @@ class Task:
         Raises
         ------
         OSError
-            Where the file cannot be written.
+            Where the file cannot be written, or what is there is not a task.
         """
-        with whole_file(path, "w") as stream:
+        with whole_file(path, "w", TASK) as stream:
             json.dump(as_dict(self), stream, indent=1, default=np.ndarray.tolist)
             stream.write("\n")
 
@@ -369,27 +415,51 @@ class Task:
             For a file that is damaged, not a task, of another version, or whose numbers contradict
             each other.
         """
-        return read_task(path, cls, Demonstration, _laid_out)
+        return read_task(path, _as_read, Demonstration, _laid_out)
 
 
-def _laid_out(task, environment, objects, turn=0.0):
-    """A task of ways that were learned, where the objects stand in an environment."""
-    partners = inverse(objects, len(environment))
-    placed = [way.among(environment, partners, turn) for way in task.learned]
-    laws, kept = zip(*(way.law(now) for way, now in zip(task.learned, placed, strict=True)), strict=True)
-    tied = tied_to_corners(task.learned[0], placed[0], laws[0], environment, objects)
-    shown = tuple(len(way.members) for way in task.learned)
-    told = told_of_places(task.learned, kept, partners)
-    return replace(
-        task,
-        law=laws[0],
-        environment=environment,
-        association=tied,
+def _as_read(law, environment, association, **known):
+    """The task of a file, or, where that holds ways and no law, what is known of it."""
+    return known if law is None else Task(law, environment, association, **known)
+
+
+def _laid_out(known, environment, objects, turn=0.0):
+    """The task of ways that were learned, and of what else is known, where objects stand in an environment."""
+    ways, partners = known["learned"], inverse(objects, len(environment))
+    placed = [way.among(environment, partners, turn) for way in ways]
+    laws, kept = zip(*(way.law(now) for way, now in zip(ways, placed, strict=True)), strict=True)
+    tied = tied_to_corners(ways[0], placed[0], laws[0], environment, objects)
+    notes = tuple(dict.fromkeys((*known["notes"], *told_of_places(ways, kept, partners))))
+    shown = tuple(len(way.members) for way in ways)
+    return Task(
+        laws[0],
+        environment,
+        tied,
         ways=laws,
         shown=shown,
-        objects=objects,
-        notes=tuple(dict.fromkeys((*task.notes, *told))),
+        **known | {"objects": objects, "notes": notes},
     )
+
+
+def checked_partners(partners, demonstrations, n):
+    """For each demonstration which of n objects its own are, (N_k,) int array or None, a tuple; or none.
+
+    Raises
+    ------
+    ValueError
+        Another number of demonstrations or of objects, or what is no number of an object.
+    """
+    partners = checked_records("partners", partners, object)
+    if len(partners) not in (0, len(demonstrations)):
+        rule = f"partners must be given for each of {len(demonstrations)} demonstrations"
+        raise ValueError(f"{rule}, got {len(partners)}")
+    found = []
+    for each, shown in zip(partners, demonstrations, strict=False):
+        if each is not None:
+            each = checked_wholes("partners", each, len(shown.environment), least=-1, most=n - 1)
+            each.flags.writeable = False
+        found.append(each)
+    return tuple(found)
 
 
 def layout_turn_of(before, after, matching):
@@ -440,10 +510,11 @@ def learn(demonstrations, environment=None, matchings=None, method="anchored", s
         environment without objects.
     """
     check_choice("method", method, METHODS)
-    demonstrations = tuple(demonstrations)
+    demonstrations = checked_records("demonstrations", demonstrations, Demonstration)
     if not demonstrations:
         raise ValueError("learning needs at least one demonstration, got none")
     environment = demonstrations[0].environment if environment is None else environment
+    checked_record("environment", environment, Environment)
     found, aside = matchings_into(environment, demonstrations, matchings)
     partners = tuple(None if each is None else each.partners for each in found)
     used = [k for k, each in enumerate(found) if each is not None]
@@ -453,14 +524,10 @@ def learn(demonstrations, environment=None, matchings=None, method="anchored", s
         law, tied, model = learn_as_paper(shown, [found[k] for k in used], environment, spread)
         return Task(law, environment, tied, model, demonstrations, notes, partners=partners)
     ways, model, told = learn_anchored(demonstrations, partners, environment, spread=spread)
-    blank = Task(
-        None,
-        environment,
-        None,
-        model,
-        demonstrations,
-        (*notes, *told),
-        partners=partners,
-        learned=ways,
-    )
-    return _laid_out(blank, environment, blank.objects)
+    known = {
+        "model": model,
+        "demonstrations": demonstrations,
+        "notes": (*notes, *told),
+        "partners": partners,
+    }
+    return _laid_out(known | {"learned": ways}, environment, np.arange(len(environment)))

@@ -15,7 +15,22 @@ from functools import partial
 import numpy as np
 import scipy
 
-from dollop.checks import check_choice, check_positive
+from dollop.checks import (
+    LATEST,
+    check_choice,
+    checked_array,
+    checked_flags,
+    checked_generator,
+    checked_number,
+    checked_record,
+    checked_whole,
+    put_in,
+)
+
+FASTEST = 1e12
+"""m/s that an estimate may have: a leap over 1e9 m within a millisecond."""
+MOST_NUMBER = 1e6
+"""Of noise, standard deviations, gates in m and times in s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +49,11 @@ class Track:
         Where no foreground object was matched and the estimate is a prediction.
     measurements : (N, 2) float array
         The matched centroid in m, `nan` where occluded.
+
+    Raises
+    ------
+    ValueError
+        No scan, arrays that are not of one length, times that fall, or what is not finite.
     """
 
     t: np.ndarray
@@ -41,6 +61,20 @@ class Track:
     velocities: np.ndarray
     occluded: np.ndarray
     measurements: np.ndarray
+
+    def __post_init__(self):
+        t = checked_array("t", self.t, "N", least=-LATEST, most=LATEST)
+        if not len(t) or (np.diff(t) < 0).any():
+            raise ValueError(f"the times of a track must rise, from one on, got {len(t)} that do not")
+        ends = {"least": -FASTEST, "most": FASTEST}
+        put_in(
+            self,
+            t=t,
+            positions=checked_array("positions", self.positions, len(t), 2, **ends),
+            velocities=checked_array("velocities", self.velocities, len(t), 2, **ends),
+            occluded=checked_flags("occluded", self.occluded, len(t)),
+            measurements=checked_array("measurements", self.measurements, len(t), 2, finite=False, **ends),
+        )
 
     def __repr__(self):
         seconds, hidden = np.ptp(self.t), self.occluded.mean()
@@ -80,10 +114,9 @@ class Motion:
     measurement_sd: float = 0.06
 
     def __post_init__(self):
-        if self.order not in (2, 3):
-            raise ValueError(f"order must be 2 (velocity) or 3 (acceleration), got {self.order}")
+        put_in(self, order=checked_whole("order, velocity or acceleration,", self.order, 2, 3))
         for name in ("noise", "measurement_sd"):
-            check_positive(name, getattr(self, name))
+            checked_number(name, getattr(self, name), 1 / MOST_NUMBER, MOST_NUMBER)
 
     def transition(self, dt):
         """F and Q over a time: integrated white noise (Bar-Shalom et al. 2001, Sec. 6.2).
@@ -98,6 +131,11 @@ class Motion:
         F, Q : (n, n) float arrays
             Transition of the state (m, m/s, m/s^2) and the covariance of its noise.
 
+        Raises
+        ------
+        ValueError
+            For what is no time.
+
         Examples
         --------
         Two steps are one long step:
@@ -106,7 +144,7 @@ class Motion:
         >>> np.allclose(F @ F, F2), np.allclose(F @ Q @ F.T + Q, Q2)
         (True, True)
         """
-        F, Q = self.transitions(np.array([dt], dtype=float))
+        F, Q = self.transitions(np.array([checked_number("dt", dt, -LATEST, LATEST)]))
         return F[0].copy(), Q[0].copy()  # views would be multiplied more slowly
 
     def transitions(self, dt):
@@ -313,11 +351,11 @@ class Tracker:
     disappear_after: float = 5.0
 
     def __post_init__(self):
+        checked_record("motion", self.motion, Motion)
         check_choice("matching", self.matching, MATCHERS)
         check_choice("occlusion", self.occlusion, ("kalman", "particles"))
         for name in ("gate", "gate_min", "gate_max", "disappear_after"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
+            checked_number(name, getattr(self, name), 1 / MOST_NUMBER, np.inf)
 
 
 def track_objects(t, objects, tracker=None, visible=None, seed=0):
@@ -353,7 +391,7 @@ def track_objects(t, objects, tracker=None, visible=None, seed=0):
     2
     """
     tracker = tracker or Tracker()
-    state = _Tracks(tracker, np.random.default_rng(seed))
+    state = _Tracks(tracker, checked_generator("seed", seed))
     intervals = np.diff(t, prepend=t[0])
     models = {dt: tracker.motion.transition(dt) for dt in np.unique(intervals)}
     for i, dt in enumerate(intervals):
@@ -648,15 +686,19 @@ def identify_user(t, tracks, faster=0.3, patience=0.5, min_age=0.5):
     >>> identify_user(t, [slow, fast])
     array([-1, -1, -1, -1,  1,  1])
     """
-    speed, seen = np.zeros((2, len(t), len(tracks) + 1))  # the last column is nobody's, for -1
+    fastest, first, speeds = np.zeros(len(t)), np.zeros(len(t), int), []
     for k, track in enumerate(tracks):
         rows = np.searchsorted(t, track.t)
-        speed[rows, k] = np.where(track.t - track.t[0] < min_age, 0.0, track.speeds)
-        seen[rows, k] = np.where(track.occluded, 0.0, speed[rows, k])
+        speed = np.where(track.t - track.t[0] < min_age, 0.0, track.speeds)
+        seen = np.where(track.occluded, 0.0, speed)
+        ahead = seen > fastest[rows]
+        fastest[rows[ahead]], first[rows[ahead]] = seen[ahead], k
+        speeds.append(dict(zip(rows.tolist(), speed.tolist(), strict=True)))
     user, since, rival = -1, np.inf, -1
     users = np.empty(len(t), int)
-    for i, best in enumerate(seen.argmax(axis=1)):
-        leads = best != user and seen[i, best] > faster + speed[i, user]
+    for i, best in enumerate(first):
+        now = speeds[user].get(i, 0.0) if user >= 0 else 0.0
+        leads = best != user and fastest[i] > faster + now
         if not leads or best != rival:
             since, rival = (t[i], best) if leads else (np.inf, -1)
         elif t[i] - since >= patience:

@@ -7,8 +7,17 @@ plane.
 import numpy as np
 import scipy
 
-from dollop.checks import checked_positions
+from dollop.checks import (
+    checked_array,
+    checked_number,
+    checked_positions,
+    checked_records,
+    checked_whole,
+)
 
+FAR_APART = 1e10  # m
+LEAST_WAY = 1e-6  # m: who has not come so far has not moved
+MOST_SAMPLES, MOST_ALIGNED, MOST_DECAY = 10_000_000, 5_000, 500.0  # those aligned are held in pairs
 _AT_ONCE = 1 << 14  # pairs of a point and an edge measured at once: they stay in a processor's cache
 _FAR, _NEAR = (
     0.2,
@@ -38,7 +47,8 @@ def check_trajectory(trajectory, name="trajectory"):
     Raises
     ------
     ValueError
-        Fewer than three points, not planar, not finite, farther away than 1e9 m, or no movement.
+        Fewer than three points, not planar, not finite, farther away than 1e9 m, or no movement by a
+        micrometre.
 
     Examples
     --------
@@ -49,7 +59,7 @@ def check_trajectory(trajectory, name="trajectory"):
     points = checked_positions(name, trajectory)
     if len(points) < 3:
         raise ValueError(f"{name} must have at least three points, got {len(points)}")
-    if not (points != points[0]).any():
+    if not np.abs(points - points[0]).max() > LEAST_WAY:
         raise ValueError(f"{name} must move, got {len(points)} times the position {points[0]}")
     return points
 
@@ -80,11 +90,40 @@ def check_trajectories(trajectories):
     >>> len(check_trajectories(walk)), len(check_trajectories([walk, walk]))
     (1, 2)
     """
-    if len(trajectories) == 0:
-        raise ValueError("trajectories must hold at least one trajectory, got none")
-    if np.ndim(trajectories[0]) == 1:
+    if is_one(trajectories):
         return [check_trajectory(trajectories)]
+    trajectories = checked_records("trajectories", trajectories, object)
+    if not trajectories:
+        raise ValueError("trajectories must hold at least one trajectory, got none")
     return [check_trajectory(each, f"trajectory {k}") for k, each in enumerate(trajectories)]
+
+
+def is_one(trajectories):
+    """Whether it is one trajectory, and not several.
+
+    Parameters
+    ----------
+    trajectories : (N, 2) array_like or sequence of K (N_k, 2) array_like
+
+    Returns
+    -------
+    bool
+        By its first row, which is numbers; what is neither is several.
+    """
+    if not isinstance(trajectories, list | tuple):
+        return len(getattr(trajectories, "shape", ())) == 2
+    first = trajectories[0] if len(trajectories) else ()
+    if not isinstance(first, list | tuple):
+        return np.ndim(first) == 1
+    return len(first) > 0 and np.isscalar(first[0])
+
+
+def _curve(name, points, d="d"):
+    """Points of a curve (N, d) as a float array of their own, one at least."""
+    points = checked_positions(name, points, "N", d)
+    if not points.size:
+        raise ValueError(f"{name} must be one at least, got none")
+    return points
 
 
 def arc_length(points):
@@ -100,12 +139,20 @@ def arc_length(points):
     (N,) float array
         m, starting at 0.
 
+    Raises
+    ------
+    ValueError
+        What is no curve of finite numbers within 1e9 m.
+
     Examples
     --------
     >>> arc_length([[0, 0], [3, 4], [3, 5]])
     array([0., 5., 6.])
     """
-    points = np.asarray(points, float)
+    return _arc_length(_curve("points", points))
+
+
+def _arc_length(points):
     way = np.zeros(len(points))
     np.linalg.norm(points[1:] - points[:-1], axis=1).cumsum(out=way[1:])
     return way
@@ -126,6 +173,11 @@ def at_arc_length(points, distance):
     (M, d) float array
         m, linear between the points, held at both ends.
 
+    Raises
+    ------
+    ValueError
+        What is no curve of finite numbers within 1e9 m, or no distances.
+
     Examples
     --------
     >>> at_arc_length([[0, 0], [3, 4], [3, 5]], [2.5, 5.5, 99])
@@ -133,9 +185,13 @@ def at_arc_length(points, distance):
            [3. , 4.5],
            [3. , 5. ]])
     """
-    walked = arc_length(points)
+    return _at_arc_length(_curve("points", points), checked_array("distance", distance, "M"))
+
+
+def _at_arc_length(points, distance):
+    walked = _arc_length(points)
     moved = np.diff(walked, prepend=-1) > 0
-    columns = np.asarray(points, float)[moved].T
+    columns = points[moved].T
     return np.stack([np.interp(distance, walked[moved], each) for each in columns], axis=1)
 
 
@@ -147,19 +203,25 @@ def resample(points, n):
     points : (N, d) array_like
         Positions in m.
     n : int
-        At least two.
+        At least two, and ten million at most.
 
     Returns
     -------
     (n, d) float array
         m; first and last are the curve's own.
 
+    Raises
+    ------
+    ValueError
+        What is no curve of finite numbers within 1e9 m, or no number of points.
+
     Examples
     --------
     >>> resample([[0, 0], [1, 0], [4, 0]], 3)[:, 0]
     array([0., 2., 4.])
     """
-    return at_arc_length(points, np.linspace(0, arc_length(points)[-1], n))
+    points, n = _curve("points", points), checked_whole("n", n, 2, MOST_SAMPLES)
+    return _at_arc_length(points, np.linspace(0, _arc_length(points)[-1], n))
 
 
 def remaining_share(n, decay):
@@ -177,11 +239,17 @@ def remaining_share(n, decay):
     (n + 1,) float array
         Geometric from 1 on, and 0 at the last.
 
+    Raises
+    ------
+    ValueError
+        For less than a step or more than ten million, a decay that is negative or beyond 500.
+
     Examples
     --------
     >>> remaining_share(3, 3 * np.log(2))
     array([1.  , 0.5 , 0.25, 0.  ])
     """
+    n, decay = checked_whole("n", n, 1, MOST_SAMPLES), checked_number("decay", decay, 0, MOST_DECAY)
     return np.append(np.exp(-decay * np.arange(n) / n), 0.0)
 
 
@@ -210,12 +278,18 @@ def retime(points, n=60, decay=3.0):
     (n + 1, d) float array
         m; the first and last are the curve's own.
 
+    Raises
+    ------
+    ValueError
+        As `remaining_share`, and for what is no curve of finite numbers within 1e9 m.
+
     Examples
     --------
     >>> retime([[0, 0], [8, 0]], 3, 3 * np.log(2))[:, 0]
     array([0., 4., 6., 8.])
     """
-    return at_arc_length(points, arc_length(points)[-1] * (1 - remaining_share(n, decay)))
+    points = _curve("points", points)
+    return _at_arc_length(points, _arc_length(points)[-1] * (1 - remaining_share(n, decay)))
 
 
 def distance_to_polyline(points, polyline):
@@ -233,12 +307,18 @@ def distance_to_polyline(points, polyline):
     (N,) float array
         m.
 
+    Raises
+    ------
+    ValueError
+        What are no finite numbers within 1e9 m, or are of several dimensions.
+
     Examples
     --------
     >>> distance_to_polyline([[1.0, 2.0], [5.0, 0.0]], [[0.0, 0.0], [2.0, 0.0]])
     array([2., 3.])
     """
-    points, polyline = np.asarray(points, float), np.asarray(polyline, float)
+    polyline = _curve("polyline", polyline)
+    points = checked_positions("points", points, "N", polyline.shape[1])
     edges = np.diff(polyline, axis=0) if len(polyline) > 1 else np.zeros_like(polyline)
     return _distance_to_edges(points, polyline[: len(edges)], edges)
 
@@ -295,7 +375,7 @@ def align(trajectories, n=200):
     Raises
     ------
     ValueError
-        What `check_trajectories` refuses.
+        What `check_trajectories` refuses, or less than two samples or more than 5000.
 
     Examples
     --------
@@ -307,7 +387,7 @@ def align(trajectories, n=200):
     >>> bool(share[1, 50] > share[0, 50])
     True
     """
-    walks = check_trajectories(trajectories)
+    walks, n = check_trajectories(trajectories), checked_whole("n", n, 2, MOST_ALIGNED)
     share = np.tile(np.linspace(0, 1, n), (len(walks), 1))
     aligned = np.stack([resample(walk, n) for walk in walks])
     if len(walks) == 1:
@@ -316,7 +396,7 @@ def align(trajectories, n=200):
     lengths = np.array([arc_length(walk)[-1] for walk in walks])
     for _ in range(_ROUNDS):
         share = _monotone_warp(resample(aligned.mean(axis=0), n), fine)
-        aligned = np.stack(list(map(at_arc_length, walks, share * lengths[:, None])))
+        aligned = np.stack(list(map(_at_arc_length, walks, share * lengths[:, None])))
     return aligned, share
 
 
@@ -379,6 +459,11 @@ def chained(apart, size, least=0.0):
     allowed : float
         How far from the next walk is still close, m.
 
+    Raises
+    ------
+    ValueError
+        Distances that are not (K, K) or negative, a negative size.
+
     Examples
     --------
     Two walks 0.5 m apart can be one way, but not if others keep to 10 cm:
@@ -388,6 +473,13 @@ def chained(apart, size, least=0.0):
     >>> chained(apart[:2, :2], 3.0)[0], chained(apart, 3.0)[0]
     (array([0, 0]), array([1, 0, 0, 0]))
     """
+    apart = checked_array("apart", apart, "K", "K", least=0, most=FAR_APART)
+    if not apart.size or apart.shape[0] != apart.shape[1]:
+        raise ValueError(f"apart must be of any two walks, got shape {apart.shape}")
+    size, least = (
+        checked_number("size", size, 0, FAR_APART),
+        checked_number("least", least, 0, FAR_APART),
+    )
     linked = np.maximum(apart, np.finfo(float).tiny)  # 0 would be no link
     gaps = np.sort(scipy.sparse.csgraph.minimum_spanning_tree(linked).data)
     usual = gaps[(len(gaps) - 1) // 2] if len(gaps) else 0.0
@@ -427,7 +519,7 @@ def ways_apart(trajectories, n=50):
     >>> ways_apart([walk[::-1], walk, walk + 0.1])[0]
     array([1, 0, 0])
     """
-    walks = check_trajectories(trajectories)
+    walks, n = check_trajectories(trajectories), checked_whole("n", n, 2, MOST_ALIGNED)
     fine = np.stack([resample(walk, 2 * n - 1) for walk in walks])
     apart = np.empty((len(walks), len(walks)))
     for k, walk in enumerate(fine):

@@ -152,7 +152,7 @@ def test_bad_associations_are_refused():
     with pytest.raises(ValueError, match="at least 1 object, got 0"):
         associate(SUBGOALS, Environment([]))
     for m in (0, 13, 1.5):
-        with pytest.raises(ValueError, match=f"between 1 and the number of corners 12, got {m}"):
+        with pytest.raises(ValueError, match=f"m, of the corners, must be a whole number, 1 to 12, got {m}"):
             associate(SUBGOALS, environment, m=m)
     with pytest.raises(ValueError, match="subgoals must be finite, got .*nan.* in row 1"):
         associate([[0, 0], [np.nan, 1]], environment)

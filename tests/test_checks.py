@@ -4,19 +4,29 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from dollop.checks import (
     FARTHEST,
+    Note,
     check_choice,
     check_positive,
     checked_array,
+    checked_flag,
+    checked_flags,
     checked_number,
     checked_positions,
+    checked_record,
+    checked_records,
+    checked_whole,
+    checked_wholes,
     put_in,
+    told,
 )
 
 NUMBERS = st.floats(-1e9, 1e9)
@@ -93,7 +103,7 @@ def test_a_number_is_finite_and_in_its_bounds(value, one, other):
         assert number == value and isinstance(number, float)
         return
     rule = "in .* to .*" if abs(value) <= FARTHEST else r"a finite number within 1e\+09"
-    with pytest.raises(ValueError, match=f"^turn must be {rule}, got {re.escape(str(value)[:60])}"):
+    with pytest.raises(ValueError, match=f"^turn must be {rule}, got {re.escape(told(value))}$"):
         checked_number("turn", value, least, most)
 
 
@@ -111,9 +121,110 @@ def test_what_is_no_number_is_named(value):
 
 
 def test_what_no_float_holds_is_cut_short():
-    """A whole number of 401 digits is refused, and 60 of them are told."""
-    with pytest.raises(ValueError, match=r"^turn must be a finite number within 1e\+09, got 10{59}$"):
+    """A whole number of 401 digits is refused, and told by how many it has."""
+    with pytest.raises(ValueError, match=r"^turn must be a finite number within 1e\+09, got .* some 401 digits$"):
         checked_number("turn", 10**400)
+    for check in (check_positive, checked_whole, checked_flag, checked_array):
+        with pytest.raises(ValueError, match="got .* some 401 digits"):
+            check("turn", 10**400)
+
+
+NO_NUMBERS = {
+    "text": ["far", 1.0], "one truth value": [0.5, True], "one truth value of numpy": [[1.0], [np.True_]],
+    "nothing": [None, 1.0], "complex": [1.0, 2j], "digits": ["1.0", "2.0"], "bytes": b"12", "a string": "12",
+    "truth values": np.array([True, False]), "objects": np.array([1.0, 2.0], dtype=object),
+    "masked": np.ma.masked_array([1.0, 2.0], [True, False]), "dates": np.array(["2004-04-26"], "datetime64[D]"),
+    "spans": [np.timedelta64(1, "s")], "complex array": np.array([1j]), "ragged": [[1.0], [1.0, 2.0]],
+    "a huge number": [10**400], "a set": {1.0}, "a dictionary": {"a": 1}, "a generator": (x for x in (1.0, 2.0)),
+    "sparse": scipy.sparse.eye(2), "None": None, "a table with text": pd.DataFrame({"x": ["a"]}),
+    "a list of a masked array": [np.ma.masked_array([1.0], [True])], "records": np.zeros(2, "f8,f8"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("values", NO_NUMBERS.values(), ids=NO_NUMBERS)
+def test_numbers_only(values):
+    """What numpy would make numbers of, or would lose in doing so, is refused, and told in a line."""
+    with pytest.raises(ValueError, match="^boxes must be numbers in rows of one length, got ") as refused:
+        checked_array("boxes", values, "N", 2)
+    assert len(str(refused.value)) < 300
+
+
+def test_a_list_that_holds_itself_is_no_array():
+    """However deep one looks."""
+    endless = [1.0]
+    endless.append(endless)
+    with pytest.raises(ValueError, match="^boxes must be numbers in rows of one length, got "):
+        checked_array("boxes", endless, "N")
+
+
+ROWS = [[1.0, 2.0], [3.0, 4.0]]
+NUMBERS_ALL = {
+    "lists": ROWS, "tuples": tuple(map(tuple, ROWS)), "arrays in a list": list(map(np.array, ROWS)),
+    "whole numbers": [[1, 2], [3, 4]], "mixed": [[np.float32(1), 2], (3, np.uint8(4))],
+    "range": [range(1, 3), range(3, 5)],
+    "single": np.array(ROWS, np.float32), "half": np.array(ROWS, np.float16), "bytes": np.array(ROWS, np.uint8),
+    "long": np.array(ROWS, np.longdouble), "a table": pd.DataFrame(ROWS), "columns": [pd.Series(row) for row in ROWS],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("values", NUMBERS_ALL.values(), ids=NUMBERS_ALL)
+def test_numbers_of_every_kind_are_welcome(values):
+    """Of Python, numpy and pandas; what comes back is a plain float array of its own."""
+    array = checked_array("boxes", values, "N", 2)
+    assert type(array) is np.ndarray and array.dtype == float and array.tolist() == ROWS
+    assert not (isinstance(values, np.ndarray) and np.shares_memory(array, values))
+
+
+def test_dots_stand_for_any_axes():
+    """A state, many states, and a grid of them."""
+    for shape in ((2,), (7, 2), (3, 4, 2)):
+        assert checked_array("states", np.zeros(shape), "...", 2).shape == shape
+    with pytest.raises(ValueError, match=r"^states must have shape \(..., 2\), got \(\)$"):
+        checked_array("states", 1.0, "...", 2)
+
+
+@given(st.one_of(st.integers(-5, 15), st.floats(-5, 15), st.booleans(), st.just("3"), st.just(np.int8(3))))
+def test_what_is_whole_comes_back_as_an_int(value):
+    """1.0 is whole, 1.9 and True are not; the bounds count."""
+    whole = not isinstance(value, bool | str) and value == int(value)
+    if whole and 1 <= value <= 8:
+        assert checked_whole("m", value, 1, 8) == value and type(checked_whole("m", value, 1, 8)) is int
+        assert checked_wholes("m", [value], "K", least=1, most=8).tolist() == [value]
+        return
+    with pytest.raises(ValueError, match=f"^m must be a whole number, 1 to 8, got {re.escape(told(value))}$"):
+        checked_whole("m", value, 1, 8)
+    with pytest.raises(ValueError, match="^m must be "):
+        checked_wholes("m", [value], "K", least=1, most=8)
+
+
+def test_a_flag_is_true_or_false():
+    """Numpy's too; 1, "no" and None are none. In arrays 0 and 1 do."""
+    assert checked_flag("avoid", np.True_) is True and checked_flag("avoid", False) is False
+    for value in (1, "abc", None, [True], np.array([True])):
+        with pytest.raises(ValueError, match="^avoid must be True or False, got "):
+            checked_flag("avoid", value)
+    for values in ([True, False], np.array([1, 0]), (1.0, 0.0), pd.Series([True, False])):
+        assert checked_flags("seen", values, "N").tolist() == [True, False]
+    for values in ([True, 0], ["a"], [2, 0], None, [[True], [True, False]], np.ma.masked_array([True], [True])):
+        with pytest.raises(ValueError, match="^seen must "):
+            checked_flags("seen", values, "N")
+
+
+def test_a_record_is_of_its_kind():
+    """One, or several; the first that is none is named."""
+    note = Note("pause", "no scan for 3 s")
+    assert checked_record("note", note, Note) is note and checked_records("notes", [note], Note) == (note,)
+    with pytest.raises(ValueError, match=r"^notes\[1\] must be a Note, got None$"):
+        checked_records("notes", [note, None], Note)
+    with pytest.raises(ValueError, match="^notes must be several of Note, got 5$"):
+        checked_records("notes", 5, Note)
+
+
+@pytest.mark.parametrize("fields", [(5, "text"), ("kind", None), ("kind", "text", "no")])
+def test_a_note_is_two_texts_and_a_flag(fields):
+    """A note that is asked whether it is in doubt must be able to tell."""
+    with pytest.raises(ValueError, match="must be a str|must be True or False"):
+        Note(*fields)
 
 
 def test_positions_lie_in_the_plane_and_on_this_planet():

@@ -1,6 +1,8 @@
 """The command line: what it writes, and what it says of bad input."""
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -9,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 from places import DATA
 
 import dollop
@@ -37,12 +40,11 @@ def test_map_and_observe_write_what_they_say(tmp_path, capsys):
         (["map", "nowhere.log", "none/room.yaml"], "none/room.yaml cannot be written: No such file"),
         (["observe", "nowhere.log", "room.yaml", "--out", "none/u.csv"], "none/u.csv cannot be written: No such file"),
         (["observe", "nowhere.log", "room.yaml", "--out", "u.png"], "--out must be named .csv"),
-        (["observe", "nowhere.log", "room.yaml", "--out", "./room.csv"], "must have another name than the map"),
         (["map", str(DATA / "empty_lab.log.gz"), "a.map", "--topic", "/scan"], "no topics, got topic='/scan'"),
         (["observe", str(DATA / "empty_lab.log.gz"), "a.map", "--topic", "/scan"], "no topics, got topic='/scan'"),
         (["map", str(DATA / "empty_lab.log.gz"), "a.map", "--fov", "180"], "state their field of view, got fov=3.14"),
         (["observe", str(DATA / "empty_lab.log.gz"), "a.map", "--fov", "360"], "state their field of view, got fov="),
-        (["map", str(DATA / "empty_lab.log.gz"), "a.map", "--resolution", "nan"], "resolution must be positive"),
+        (["map", str(DATA / "empty_lab.log.gz"), "a.map", "--resolution", "nan"], "resolution must be a finite number"),
         (["observe", str(DATA / "moved_cans_0.log.gz"), LAB, "--min-area", "nan"], "got nan"),
         (["observe", str(DATA / "moved_cans_0.log.gz"), LAB], "nobody walks in"),
         (["observe", EIGHTS, LAB, "--user", "8.5,1.5"], "when first seen: 0 at ("),
@@ -61,6 +63,104 @@ def test_bad_input_ends_with_one_line(arguments, message, tmp_path, monkeypatch)
         main(arguments)
     assert message in str(end.value) and str(end.value).startswith("dollop: ")
     assert list(tmp_path.iterdir()) == []
+
+
+def content(folder):
+    """Every file in a folder, by its name."""
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+@pytest.fixture
+def room(tmp_path, monkeypatch):
+    """A folder to work in, with a log, and a map whose picture is a PNG."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(DATA / "slalom_0.log.gz", "walk.log.gz")
+    with Image.open(DATA / "lab.pgm") as picture:
+        picture.save("scan.png")
+    Path("room.yaml").write_text((DATA / "lab.yaml").read_text().replace("lab.pgm", "scan.png"))
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["observe", "walk.log.gz", "room.yaml", "--out", "scan.csv"],
+            "scan.png cannot be written: it is scan.png, which",
+        ),
+        (
+            ["observe", "walk.log.gz", "here.yaml", "--out", "scan.csv"],
+            "scan.png cannot be written: it is scan.png, which",
+        ),
+        (["observe", "walk.log.gz", "lab.yaml", "--out", "scan.csv"], "it is the picture of the map here.yaml"),
+        (
+            ["observe", "table.csv", "room.yaml", "--out", "table.csv"],
+            "table.csv cannot be written: it is table.csv, which",
+        ),
+        (
+            ["observe", "walk.log.gz", "room.yaml", "--tracks", "table.csv"],
+            "holds something else and not a table of every",
+        ),
+        (
+            ["observe", "walk.log.gz", "room.yaml", "--out", "a.csv", "--tracks", "./b/../a.csv"],
+            "which is written as well",
+        ),
+        (["map", "walk.log.gz", "lab.yml"], "lab.pgm cannot be written: it is the picture of the map lab.yaml"),
+        (["map", "walk.log.gz", "log.map"], "log.map cannot be written: it is walk.log.gz, which is read"),
+        (["map", "walk.log.gz", "task.map"], "task.map cannot be written: it holds a task and not a CARMEN map"),
+        (["map", "walk.log.gz", "fifo.map"], "fifo.map cannot be written: it is no ordinary file"),
+    ],
+)
+def test_no_command_destroys_a_file(arguments, message, room):
+    """What is read, what belongs to another map and what is something else stays as it is: told before the work."""
+    for name in ("lab.yaml", "lab.pgm"):
+        shutil.copy(DATA / name, name)
+    shutil.copy("room.yaml", "here.yaml")
+    Path("table.csv").write_text("mine\n")
+    Path("b").mkdir()
+    Path("log.map").symlink_to("walk.log.gz")
+    Path("task.map").write_text('{"format": "dollop task"}')
+    os.mkfifo("fifo.map")
+    files = [path for path in room.iterdir() if path.is_file()]
+    before = {path: path.read_bytes() for path in files}
+    with pytest.raises(SystemExit, match=f"^dollop: .*{re.escape(message)}"):
+        main(arguments)
+    assert {path: path.read_bytes() for path in room.iterdir() if path.is_file()} == before
+
+
+def test_what_a_command_wrote_it_writes_again(room):
+    """The same command twice replaces its own files, with the same."""
+    command = ["observe", "walk.log.gz", "room.yaml", "--out", "user.csv", "--tracks", "all.csv"]
+    main(command)
+    once = content(room)
+    main(command)
+    assert content(room) == once and {"user.csv", "user.png", "all.csv"} <= once.keys()
+
+
+def test_an_interrupt_while_drawing_leaves_the_old_files(room, monkeypatch):
+    """Ctrl-C before the last of the files is written: none is replaced, and nothing is left beside them."""
+    main(["observe", "walk.log.gz", "room.yaml", "--tracks", "all.csv"])
+    before = content(room)
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dollop.cli._write_track", interrupted)
+    with pytest.raises(SystemExit) as end:
+        main(["observe", "walk.log.gz", "room.yaml", "--tracks", "all.csv", "--min-area", "0.02"])
+    assert end.value.code == 130 and content(room) == before
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes as POSIX has them")
+def test_a_closed_pipe_ends_a_command_without_a_traceback(room):
+    """Nobody reads what is said: the files are there, whole, and the status says that something went wrong."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "dollop", "observe", "walk.log.gz", "room.yaml"]
+    ended = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True)
+    os.close(writing)
+    assert (ended.returncode, ended.stderr) == (1, "")
+    assert len(pd.read_csv("user.csv")) > 100 and (room / "user.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("arguments", [["--user", "bob"], ["--user", "1;2"], ["--stride", "0.6"]])

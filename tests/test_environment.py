@@ -107,7 +107,7 @@ def test_assumed_sides_are_four_for_each_box():
     """None where not given; another number of them is refused."""
     assert not Environment(BOXES).assumed.any()
     assert Environment(BOXES, assumed=[[0, 0, 0, 1], [1, 0, 0, 0]]).assumed.sum() == 2
-    with pytest.raises(ValueError, match=r"assumed must hold four sides .* shape \(1, 4\) for 2"):
+    with pytest.raises(ValueError, match=r"assumed must have shape \(2, 4\), got \(1, 4\)"):
         Environment(BOXES, assumed=np.zeros((1, 4), bool))
 
 
@@ -209,3 +209,9 @@ def test_where_an_object_would_have_been_found_is_seen():
     assert seen.at([[4.5, 3.0], [2.5, 3.3], [4.5, 6.5], [8.0, 2.0]]).all()
     beyond = SENSOR[:2] + 1.3 * (CANS[:, :2] + 0.2 - SENSOR[:2])
     assert not seen.at([*beyond, [4.5, 7.4], [-0.3, 3.0]]).any()
+
+
+def test_springs_between_thousands_of_corners_are_refused():
+    """All pairs are looked at, so there is a bound, and it is named."""
+    with pytest.raises(ValueError, match="between at most 2000 corners, got 2001"):
+        spring_forces(np.arange(4002.0).reshape(-1, 2))

@@ -27,7 +27,7 @@ from rooms import (
     watched,
 )
 
-from dollop import OccupancyGrid, SequencedLDS, Tracker, laps, observe, read_log
+from dollop import Demonstration, OccupancyGrid, SequencedLDS, Tracker, laps, observe, read_log
 from dollop.foreground import ForegroundGrid
 from dollop.lab import Recording
 from dollop.lab.truth import track_error
@@ -468,7 +468,7 @@ BAD = {
     "pose": ((9.0, np.ones(181), [np.nan, 0, 0]), "pose must be finite, got nan"),
     "older": ((0.5, np.ones(181), SENSOR), r"t must be later than the last scan's 1.0, got 0.5"),
     "as old": ((1.0, np.ones(181), SENSOR), r"t must be later than the last scan's 1.0, got 1.0"),
-    "no time": ((np.nan, np.ones(181), SENSOR), "t must be a finite number of s, got .*nan"),
+    "no time": ((np.nan, np.ones(181), SENSOR), "t must be a finite number, got .*nan"),
     "negative": ((9.0, np.full(181, -0.5), SENSOR), "must not be negative or NaN, got -0.5"),
     "none": ((9.0, np.full(181, np.nan), SENSOR), "must not be negative or NaN, got nan"),
     "beams": ((9.0, np.ones(180), SENSOR), r"ranges must have shape \(181,\), got \(180,\)"),
@@ -531,6 +531,28 @@ def test_a_clock_that_jumps_by_years_costs_no_memory():
     observation = observer.observation()
     assert max(peak, tracemalloc.get_traced_memory()[1]) < 50e6
     assert [round(np.ptp(each.t)) for each in observation.people] == [5, 5]
+
+
+@pytest.mark.parametrize("method", ["people", "paper"])
+@pytest.mark.parametrize("jump", [86_400.0, 1.7e9])
+def test_a_clock_that_jumps_is_noted(method, jump):
+    """By a day or from 1970 until now, forwards: whoever looks at the result is told. Backwards there is no log."""
+    log = watched(TO_AND_FRO, CANS)
+    late = np.arange(len(log)) >= 50
+    assert not observe(log, room_map(), method=method).notes
+    notes = observe(replace(log, t=log.t + jump * late), room_map(), method=method).notes
+    (note,) = (note for note in notes if note.kind == "pause")
+    assert note.doubt and f"no scan for {jump:.4g} s" in note.text
+    with pytest.raises(ValueError, match="t must increase"):
+        replace(log, t=log.t - jump * late)
+
+
+def test_a_clock_that_jumps_is_no_demonstration():
+    """Not by the paper's method either, by which who walks on is the same: the gap is named."""
+    log = watched(TO_AND_FRO)
+    late = replace(log, t=np.where(np.arange(len(log)) < 50, log.t, log.t + 1.7e9))
+    with pytest.raises(ValueError, match="t must not consist of gaps"):
+        Demonstration.of(observe(late, room_map(), method="paper"))
 
 
 # ---- recordings that nobody here made

@@ -13,7 +13,7 @@ from walks import any_walk, moving, walk_figure_eights
 
 from dollop.laps import laps
 from dollop.law.timing import turns_at
-from dollop.lds import LDS
+from dollop.lds import LDS, Statistics
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory, resample
 
@@ -179,15 +179,15 @@ def test_handwritten_letters_are_drawn(letter):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"tolerance": 0}, "tolerance must be positive, got 0"),
-        ({"tolerance": np.nan}, "tolerance must be positive, got nan"),
-        ({"n_segments": 0}, "n_segments must be a whole number from 1 to 49.*got 0"),
-        ({"n_segments": 50}, "n_segments must be a whole number from 1 to 49.*got 50"),
+        ({"tolerance": 0}, "tolerance must be in 1e-06 to 1e.09, got 0"),
+        ({"tolerance": np.nan}, "tolerance must be a finite number .*, got nan"),
+        ({"n_segments": 0}, "n_segments must be a whole number, 1 to 49, got 0"),
+        ({"n_segments": 50}, "n_segments must be a whole number, 1 to 49, got 50"),
         ({"n_segments": 2.5}, "n_segments must be a whole number"),
         ({"n_segments": np.nan}, "n_segments must be a whole number.*got nan"),
-        ({"candidates": 10**6}, "candidates must be 3 to 1000, got 1000000"),
-        ({"sample_period": -0.1}, "sample_period must be positive and finite, got -0.1"),
-        ({"candidates": 2}, "candidates must be 3 to 1000, got 2"),
+        ({"candidates": 10**6}, "candidates must be a whole number, 3 to 1000, got 1000000"),
+        ({"sample_period": -0.1}, "sample_period must be in 1e-06 to 1e.06, got -0.1"),
+        ({"candidates": 2}, "candidates must be a whole number, 3 to 1000, got 2"),
         ({"tolerance": 1e-6}, r"tolerance 1e-06 m cannot be kept with 100 candidate cuts, 0\.\d+ "),
     ],
 )
@@ -202,7 +202,8 @@ def test_walks_of_another_way_are_never_averaged(five_laps, others):
     """A walk backwards is named, with how far it is away and what to do, whether or not it is outnumbered."""
     walks = [*five_laps[:others], five_laps[3], five_laps[4][::-1]]
     with pytest.raises(
-        ValueError, match=rf"got trajectory {others + 1} .* m away from .*dollop.learn keeps ways apart"
+        ValueError,
+        match=rf"got trajectory {others + 1} .* m away from .*dollop.learn keeps ways apart",
     ):
         SequencedLDS.fit(walks)
 
@@ -254,7 +255,7 @@ def test_bad_subgoals_and_starts(law):
         law.with_subgoals(law.subgoals[:-1])
     with pytest.raises(ValueError, match="start must be finite"):
         law.response([np.nan, 0])
-    with pytest.raises(ValueError, match="reach must be at least 1e-06 m, got 0"):
+    with pytest.raises(ValueError, match="reach must be in 1e-06 to 1e.09, got 0"):
         law.response(reach=0)
 
 
@@ -270,3 +271,27 @@ def test_any_walk_can_be_fitted(walk, count, retimed):
     assert np.linalg.norm(law.response()[-1] - law.subgoals[-1]) <= 0.01
     fastest = max(np.diff(arc_length(walk)).max() for walk in walks) / 0.1
     assert (law.speeds >= 0).all() and (law.speeds <= fastest * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("method", ["held", "paper"])
+def test_a_response_that_takes_too_long_is_refused(method):
+    """An LDS that keeps all but a billionth of its offset would need ten thousand million steps."""
+    slow = LDS(Statistics(np.eye(2), (1 - 1e-9) * np.eye(2)), np.zeros(2))
+    law = SequencedLDS((slow,), np.array([3.0, 1.0]), np.ones(1))
+    with pytest.raises(ValueError, match="must come within 0.01 m of its subgoal in 100000 steps"):
+        law.response(method=method)
+
+
+def test_a_subgoal_beyond_all_precision_is_refused(law):
+    """At 1e17 m neighbouring numbers are 16 m apart: no robot drives there."""
+    with pytest.raises(ValueError, match=r"subgoals must lie within 1e\+09 m of the origin, got 1e\+17 m"):
+        law.with_subgoals(law.subgoals + [1e17, 0.0])
+
+
+@pytest.mark.parametrize("goal", [1e6, -0.9e9])
+def test_as_far_as_places_may_be_every_response_arrives(law, goal):
+    """Nine hundred million metres off, to a tenth of a millimetre; a micrometre is eight steps of such numbers."""
+    far = law.with_subgoals(law.subgoals + goal)
+    for method in ("held", "paper"):
+        end = far.response(reach=1e-4, method=method)[-1]
+        assert np.linalg.norm(end - far.subgoals[-1]) <= 1e-4

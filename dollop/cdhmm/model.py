@@ -27,11 +27,25 @@ from dollop.cdhmm.evidence import (
 )
 from dollop.cdhmm.growing import structure_of
 from dollop.cdhmm.spread import estimate_spread
-from dollop.checks import checked_positions
+from dollop.checks import (
+    checked_array,
+    checked_flag,
+    checked_number,
+    checked_positions,
+    checked_records,
+    checked_wholes,
+    put_in,
+    told,
+)
 
 __all__ = ["SubgoalHMM"]
 
 LEAST_SPREAD, MOST_SPREAD = 1e-6, 1e6  # m: beyond, the evidence drowns in rounding
+ROUNDING, MOST_EVIDENCE, MOST_VARIANCE = (
+    1e-6,
+    1e18,
+    1e20,
+)  # by which sums may miss 1; nats; m^2, of 1e9 m
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +79,12 @@ class SubgoalHMM:
     estimated : bool
         Whether nobody named the spread.
 
+    Raises
+    ------
+    ValueError
+        Arrays that are not of one number of states, what is no probability or no covariance, and
+        states that are not one for each subgoal, do not rise, or have no subgoal.
+
     Examples
     --------
     The second demonstration has one subgoal more, which is no part of the task:
@@ -85,6 +105,35 @@ class SubgoalHMM:
     spread: float
     evidence: float
     estimated: bool = False
+
+    def __post_init__(self):
+        means, most = checked_positions("means", self.means), 1 + ROUNDING
+        n = len(means)
+        sequences = checked_records("sequences", self.sequences, object)
+        states = checked_records("states", self.states, object)
+        if not (n and sequences) or len(sequences) != len(states):
+            raise ValueError(f"a model needs states for each of its sequences, got {told(states)}")
+        sequences = tuple(checked_sequence(each, f"demonstration {k}") for k, each in enumerate(sequences))
+        pairs = zip(states, sequences, strict=True)
+        states = tuple(checked_wholes("states", each, len(shown), most=n - 1) for each, shown in pairs)
+        rising = all((np.diff(each) > 0).all() for each in states)
+        if not rising or len(np.unique(np.concatenate(states))) < n:
+            raise ValueError(f"states must rise in each sequence, and all be there, got {told(states)}")
+        for each in (*sequences, *states):
+            each.flags.writeable = False
+        put_in(
+            self,
+            means=means,
+            covariances=checked_covariances(self.covariances, n),
+            transitions=checked_array("transitions", self.transitions, n, n, least=0, most=most),
+            start=checked_array("start", self.start, n, least=0, most=most),
+            end=checked_array("end", self.end, n, least=0, most=most),
+            sequences=sequences,
+            states=states,
+            spread=checked_number("spread", self.spread, LEAST_SPREAD, MOST_SPREAD),
+            evidence=checked_number("evidence", self.evidence, -MOST_EVIDENCE, MOST_EVIDENCE),
+            estimated=checked_flag("estimated", self.estimated),
+        )
 
     def __repr__(self):
         path = " ".join(map(str, self.most_likely_path()))
@@ -125,13 +174,13 @@ class SubgoalHMM:
         >>> len(model.most_likely_path()), round(model.spread, 1)
         (4, 0.3)
         """
+        sequences = checked_records("sequences", sequences, object)
         sequences = tuple(checked_sequence(s, f"demonstration {k}") for k, s in enumerate(sequences))
         if not sequences:
             raise ValueError("sequences must hold at least one demonstration, got none")
         estimated = spread is None
         spread = estimate_spread(sequences) if estimated else spread
-        if not LEAST_SPREAD <= spread <= MOST_SPREAD:
-            raise ValueError(f"spread must lie between {LEAST_SPREAD:g} and {MOST_SPREAD:g} m, got {spread}")
+        spread = checked_number("spread", spread, LEAST_SPREAD, MOST_SPREAD)
         chains = chains_of(sequences, spread)
         labels = alignment.set_apart(structure_of(chains), chains)
         labels = alignment.numbered(labels, chains)
@@ -301,6 +350,17 @@ def log_normal(points, means, covariances):
     offsets = points[:, None] - means
     distance = np.einsum("lsi,sij,lsj->ls", offsets, np.linalg.inv(covariances), offsets)
     return -0.5 * (distance + np.linalg.slogdet(covariances)[1]) - np.log(2 * np.pi)
+
+
+def checked_covariances(covariances, n):
+    """Covariances (n, 2, 2) in m^2; ValueError for what is not symmetric and positive definite."""
+    covariances = checked_array("covariances", covariances, n, 2, 2, least=-MOST_VARIANCE, most=MOST_VARIANCE)
+    (a, b), (c, d) = np.moveaxis(covariances, 0, -1)
+    sound = (a > 0) & (d > 0) & (np.abs(b - c) <= ROUNDING * (a + d)) & (a * d > b * c)
+    if not sound.all():
+        found = covariances[np.flatnonzero(~sound)[0]].tolist()
+        raise ValueError(f"covariances must be symmetric and positive definite, got {told(found)}")
+    return covariances
 
 
 def checked_sequence(sequence, name):

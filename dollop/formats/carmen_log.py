@@ -6,16 +6,27 @@ log began.
 """
 
 import gzip
-import io
 from contextlib import nullcontext
 from functools import partial
 
 import numpy as np
 
-from dollop.checks import check_positive, checked_array, checked_number
-from dollop.formats.files import FormatError, from_file, read_bytes
+from dollop.checks import check_positive, checked_number, told
+from dollop.formats.files import MAX_LINES, FormatError, from_file, read_lines
+from dollop.formats.kinds import CARMEN_LOG
 from dollop.formats.odometry import Odometry
-from dollop.formats.scans import Beams, Scan, doubtful, forgive, forgive_disorder, no_return_from, usable_scans
+from dollop.formats.scans import (
+    MAX_READINGS,
+    Beams,
+    Scan,
+    check_beams,
+    check_metres,
+    doubtful,
+    forgive,
+    forgive_disorder,
+    no_return_from,
+    usable_scans,
+)
 from dollop.formats.writing import whole_file
 from dollop.laser import LaserLog
 from dollop.pose import wrapped
@@ -29,6 +40,9 @@ the maximum range of a FLASER line (`readlog.c`; 13 bits of 1 cm end at 81.91 m)
 
 PER_DEGREE = {180: 1, 181: 1, 360: 2, 361: 2, 400: 4, 401: 4}
 """Beams per degree by the numbers of beams that CARMEN's reader knows."""
+
+LARGEST = 1e10
+"""No number of a message is larger: seconds since 1970 are as many in the year 2286."""
 
 SICK_TYPES, UNKNOWN_TYPE = (0, 1), 99
 """`laser_type` of the SICK LMS and PLS, and of a laser CARMEN has no name for."""
@@ -64,8 +78,9 @@ def read_log(path, max_range=None, fov=None):
     Raises
     ------
     FormatError
-        If the file is no CARMEN log, holds no scan, or more than a few scans are broken
-        (`dollop.formats.scans.forgive`).
+        If the file is no CARMEN log, holds no scan, more than a few scans are broken
+        (`dollop.formats.scans.forgive`), or there is more of it than is read: 100 million readings, 36,000
+        beams in a scan, and what `dollop.formats.files.read_lines` says.
     ValueError
         If `max_range` is not positive and finite, if `fov` is not an angle up to a full turn, or is
         told of messages that state their own.
@@ -126,30 +141,40 @@ def _closes(ranges):
 
 def _scans(path, fov):
     """All good scans of the preferred message by their line, and the reason of the broken ones."""
-    content = read_bytes(path)
-    if b"\0" in content[:4096]:
-        raise FormatError("binary data, where a CARMEN log is text", path)
-    parsers = {b"ROBOTLASER1": _parse_robotlaser, b"FLASER": partial(_parse_flaser, fov=fov)}
-    for name, parse in parsers.items():
-        good, bad = _messages(content, name, parse)
-        if good and fov is not None and name != b"FLASER":
-            raise ValueError(f"{path}: ROBOTLASER1 messages state their field of view, got fov={fov:g}")
+    robot, plain = _messages(path, {b"ROBOTLASER1": _parse_robotlaser, b"FLASER": partial(_parse_flaser, fov=fov)})
+    if robot[0] and fov is not None:
+        raise ValueError(f"{path}: ROBOTLASER1 messages state their field of view, got fov={fov:g}")
+    for good, bad in (robot, plain):
         if good:
             return good, bad
         forgive(path, bad, len(bad))  # which it refuses, if there is any
     raise FormatError("no FLASER or ROBOTLASER1 message in the file", path)
 
 
-def _messages(content, name, parse):
-    """What each good message of a name holds, by its line, and the reason of each broken one."""
-    good, bad = {}, {}
-    for number, line in enumerate(io.BytesIO(content), 1):
-        if line.split(None, 1)[:1] == [name]:
-            try:
-                good[number] = parse(line.split())
-            except ValueError as error:
-                bad[number] = str(error)[:200]  # what it repeats may be as long as the file
-    return good, bad
+def _messages(path, parsers):
+    """What each good message holds, by its line, and the reason of each broken one: both for each name.
+
+    Of several names the first that a good message has is read from there on, and no other.
+    """
+    found = {name: ({}, {}) for name in parsers}
+    names, room = tuple(found), MAX_READINGS
+    for number, line in enumerate(read_lines(path), 1):
+        if not line.lstrip().startswith(names):
+            continue
+        name, *_ = fields = line.split()
+        if name not in names:
+            continue
+        good, bad = found[name]
+        try:
+            good[number] = parsers[name](fields)
+            names, room = names[: names.index(name) + 1], room - len(fields)
+        except ValueError as error:
+            bad[number] = str(error)[:200]  # what it repeats may be as long as the file
+        if len(bad) > MAX_LINES // 100:  # more than are forgiven, however many follow
+            break
+        if room < 0:
+            raise FormatError(f"more than {MAX_READINGS} readings, the most that is read", path, number)
+    return found.values()
 
 
 def _parse_flaser(fields, fov=None):
@@ -158,7 +183,9 @@ def _parse_flaser(fields, fov=None):
     """
     count = _count(fields, 1)
     _check_ending(fields, 9 + count)
-    return _scan(_flaser_beams(count, fov), fields[2 : 2 + count], fields[2 + count : 9 + count])
+    beams = _flaser_beams(count, fov)
+    check_beams(beams)
+    return _scan(beams, fields[2 : 2 + count], fields[2 + count : 9 + count])
 
 
 def _flaser_beams(count, fov=None):
@@ -186,10 +213,11 @@ def _parse_robotlaser(fields):
     count = _count(fields, 8)
     rest = 10 + count + _count(fields, 9 + count, least=0)
     _check_ending(fields, rest + 12)
-    kind, start, _, step, limit = _numbers(fields[1:6])
+    kind, start, _, step, limit = _numbers(fields[1:6]).tolist()
     check_positive("an angular resolution", step)
     check_positive("a maximum range", limit)
     beams = Beams(count, start, step, limit, kind in SICK_TYPES)
+    check_beams(beams)
     return _scan(beams, fields[9 : 9 + count], fields[rest : rest + 12])
 
 
@@ -197,6 +225,8 @@ def _scan(beams, ranges, ending):
     """The scan of a message that ends with the laser's pose, what does not matter, and the time."""
     ranges, ending = _numbers(ranges), _numbers(ending)
     check_positive("a range", ranges.min(), or_zero=True)
+    check_metres("a range", ranges)
+    check_metres("a pose", ending[:3])
     return Scan(beams, ranges, ending[:3], ending[-1])
 
 
@@ -208,7 +238,10 @@ def _parse_odometry(fields):
 
 def _count(fields, place, least=1):
     """The number of readings that follow; 0 if the line ends before."""
-    count = int(fields[place]) if place < len(fields) else 0
+    text = fields[place] if place < len(fields) else b"0"
+    if b"_" in text or len(text) > 9:
+        raise ValueError(f"a number of readings must be a whole number of at most nine digits, got {told(text)}")
+    count = int(text)
     if count < least:
         raise ValueError(f"a number of readings must be at least {least}, got {count}")
     return count
@@ -221,7 +254,14 @@ def _check_ending(fields, used):
 
 
 def _numbers(fields):
-    return checked_array("the numbers of a message", fields, "N")
+    """Numbers as C writes them, (N,)."""
+    if b"_" in b"".join(fields):  # which Python passes over
+        raise ValueError(f"a number has no underscore, got {told(next(each for each in fields if b'_' in each))}")
+    numbers = np.array(list(map(float, fields)))
+    if not np.abs(numbers).max(initial=0) <= LARGEST:
+        wrong = numbers[~(np.abs(numbers) <= LARGEST)][0]
+        raise ValueError(f"the numbers of a message must be finite, and within {LARGEST:g}, got {wrong:g}")
+    return numbers
 
 
 def write_log(path, log):
@@ -262,7 +302,7 @@ def write_log(path, log):
         raise ValueError(f"the beams of a CARMEN log must be evenly spaced, these are up to {uneven:.3g} rad off")
     laser = " ".join(repr(float(value)) for value in (log.angles[0], fov, step, log.max_range))
     head = f"ROBOTLASER1 {UNKNOWN_TYPE} {laser} 0.001 0 {count}"
-    with whole_file(path) as stream, _packed(stream, path) as text:
+    with whole_file(path, kind=CARMEN_LOG) as stream, _packed(stream, path) as text:
         text.write(b"# CARMEN Logfile\n# distances in m, angles in rad, times in s\n")
         for t, ranges, pose in zip(log.t, _written_ranges(log), log.poses, strict=True):
             numbers = " ".join([f"{value:.3f}" for value in ranges.tolist()])
@@ -311,10 +351,10 @@ def read_odometry(path):
     UserWarning
         If messages were left out.
     """
-    good, bad = _messages(read_bytes(path), b"ODOM", _parse_odometry)
+    ((good, bad),) = _messages(path, {b"ODOM": _parse_odometry})
+    forgive(path, bad, len(good) + len(bad))
     if not good:
         raise FormatError("no readable ODOM message in the file", path)
-    forgive(path, bad, len(good) + len(bad))
     rows = np.array(list(good.values()))
     rows = rows[forgive_disorder(path, rows[:, 6], "ODOM")]
     rows[:, 2] = wrapped(rows[:, 2])

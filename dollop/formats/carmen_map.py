@@ -5,17 +5,28 @@ import struct
 
 import numpy as np
 
-from dollop.checks import checked_array
-from dollop.formats.files import FormatError, from_file, read_bytes
-from dollop.formats.writing import whole_file
+from dollop.checks import told
+from dollop.formats.files import (
+    MAX_CELLS,
+    FormatError,
+    check_cells,
+    from_file,
+    read_bytes,
+    written_number,
+)
+from dollop.formats.kinds import CARMEN_MAP
+from dollop.formats.writing import Output, whole_file
 
-__all__ = ["OCCUPIED_FROM", "read_map", "write_map"]
+__all__ = ["OCCUPIED_FROM", "outputs", "read_map", "write_map"]
 
 OCCUPIED_FROM = 0.5
 """Probability from which a cell is occupied (`occupied_prob` in CARMEN's parameters)."""
 
 MAP_LABEL = b"CARMENMAPFILEv020"
 GRIDMAP_CHUNK, NAMED_CHUNK = 1, 128
+
+MAX_HEAD, MAX_CHUNKS = 1 << 16, 1000
+"""Bytes of the comment lines, and chunks that are looked through: CARMEN writes ten lines and five chunks."""
 
 
 def read_map(path):
@@ -29,7 +40,7 @@ def read_map(path):
     Parameters
     ----------
     path : str or Path
-        The map.
+        The map, of at most 25 million cells, its comment lines in the first 64 KiB.
 
     Returns
     -------
@@ -46,8 +57,8 @@ def read_map(path):
     FormatError
         If label, chunks, sizes or probabilities are not what they should be.
     """
-    content = read_bytes(path)
-    head = re.match(rb"((#.*)?\n)*" + MAP_LABEL, content)
+    content = read_bytes(path, 4 * MAX_CELLS + (1 << 20))
+    head = re.match(rb"((#.*)?\n)*" + MAP_LABEL, content[:MAX_HEAD])
     if not head:
         raise FormatError(f"no {MAP_LABEL.decode()} after the comment lines", path)
     body = _gridmap_chunk(path, content, head.end())
@@ -56,9 +67,11 @@ def read_map(path):
     if not (fits and width > 0 and height > 0 and 0 < resolution < np.inf):
         cells = f"{width} x {height} cells of {resolution} m"
         raise FormatError(f"{cells} do not fit a chunk of {len(body)} bytes", path)
+    from_file(path, check_cells, width, height)
     # float32 turns 0.1 into 0.10000000149; seven digits are all it holds.
     resolution = float(f"{resolution:.7g}")
-    occupancy = np.frombuffer(body, "<f4", offset=12).reshape(width, height).T.astype(float)
+    with np.errstate(invalid="ignore"):  # a NaN that signals is found below
+        occupancy = np.frombuffer(body, "<f4", offset=12).reshape(width, height).T.astype(float)
     wrong = ~((occupancy == -1) | ((occupancy >= 0) & (occupancy <= 1)))
     if wrong.any():
         raise FormatError(f"an occupancy must be in [0, 1], or -1 where unknown, got {occupancy[wrong][0]}", path)
@@ -68,7 +81,9 @@ def read_map(path):
 
 def _gridmap_chunk(path, content, place):
     """Content of the first gridmap chunk, without its description and name."""
-    while place + 5 <= len(content):
+    for _ in range(MAX_CHUNKS):
+        if place + 5 > len(content):
+            raise FormatError("no gridmap chunk in the file", path)
         kind, size = struct.unpack_from("<Bi", content, place)
         if size < 0 or place + 5 + size > len(content):
             raise FormatError(f"a chunk of {size} bytes at byte {place} runs past the end of the file", path)
@@ -76,7 +91,7 @@ def _gridmap_chunk(path, content, place):
         if kind & ~NAMED_CHUNK == GRIDMAP_CHUNK:
             return chunk.partition(b"\0")[2] if kind & NAMED_CHUNK else chunk
         place += 5 + size
-    raise FormatError("no gridmap chunk in the file", path)
+    raise FormatError(f"no gridmap chunk among the first {MAX_CHUNKS}, the most that are looked through", path)
 
 
 def _map_origin(path, head, resolution):
@@ -84,7 +99,24 @@ def _map_origin(path, head, resolution):
     found = re.search(rb"^# Lower left    : (.*)$", head, re.MULTILINE)
     if not found:
         return -resolution / 2, -resolution / 2
-    return tuple(from_file(path, checked_array, "the lower left corner", found[1].split(), 2).tolist())
+    name, corner = "the lower left corner", found[1].decode(errors="replace").split()
+    if len(corner) != 2:
+        raise FormatError(f"{name} must be two numbers, got {told(found[1])}", path)
+    return tuple(from_file(path, written_number, name, each) for each in corner)
+
+
+def outputs(path):
+    """What `write_map` writes.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    list of Output
+    """
+    return [Output(path, CARMEN_MAP)]
 
 
 def write_map(path, occupancy, origin, resolution):
@@ -110,7 +142,7 @@ def write_map(path, occupancy, origin, resolution):
     chunk = b"GRIDMAP   " + struct.pack("<iif", width, height, resolution) + cells
     head = f"# Map size      : {width} x {height}\n# Resolution    : {resolution:g}\n"
     head += f"# Lower left    : {float(origin[0])!r} {float(origin[1])!r}\n"
-    with whole_file(path) as stream:
+    with whole_file(path, kind=CARMEN_MAP) as stream:
         stream.write(b"# Carnegie Mellon Robot Toolkit (CARMEN) map file\n")
         stream.write(head.encode() + MAP_LABEL)
         stream.write(struct.pack("<Bi", GRIDMAP_CHUNK, len(chunk)) + chunk)

@@ -2,16 +2,50 @@
 
 import codecs
 import gzip
+import io
+import json
+import math
+import os
+import re
 import sys
 import warnings
 import zlib
+from collections import Counter
+from contextlib import contextmanager
+from functools import partial
 
-from dollop.checks import LONGEST, shortened
+from dollop.checks import FARTHEST, LONGEST, shortened, told
 
-__all__ = ["FormatError", "from_file", "of_file", "read_bytes", "warn_of"]
+__all__ = [
+    "MAX_CELLS",
+    "MAX_LINES",
+    "FormatError",
+    "check_cells",
+    "check_fields",
+    "from_file",
+    "of_file",
+    "read_bytes",
+    "read_json",
+    "read_lines",
+    "warn_of",
+    "written_number",
+]
 
 MAX_BYTES = 1 << 30
 """The most that is read of one file, unpacked: a small gzip can hold anything."""
+PIECE = 1 << 18
+"""Bytes that are read at once, so that no more room is taken than the file needs."""
+MAX_LINES, MAX_LINE = 2_000_000, 1 << 20
+"""Lines of a log, and bytes of one: five hours of a hundred messages a second, 100,000 readings in each."""
+MOST_PACKED, UNPACKED = 100, 1 << 20
+"""How many times its size a packed text may unpack to, and bytes from which on that counts: messages
+differ in their times and readings, and gzip packs what does not differ a thousand times."""
+MAX_CELLS = 25_000_000
+"""Cells of a map, or pixels of its picture: 250 m x 250 m at 5 cm, for which a gigabyte is needed."""
+MAX_JSON, MAX_VALUES = 64 << 20, 1_000_000
+"""Bytes and values of a JSON file: a task of an hour's walks in a hall, many times over."""
+NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+"""A number as C, YAML and ROS write it."""
 
 
 class FormatError(ValueError):
@@ -106,7 +140,25 @@ def warn_of(path, text):
     warnings.warn(of_file(path, text), stacklevel=depth)
 
 
-def read_bytes(path):
+@contextmanager
+def _opened(path):
+    """The file as it is unpacked, for reading, and its size in bytes as it lies there."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        kind = "a folder" if os.path.isdir(path) else "a device or a pipe"
+        raise FormatError(f"must be an ordinary file, and is {kind}", path)
+    with open(path, "rb") as stream:
+        zipped = stream.read(2) == b"\x1f\x8b"
+        stream.seek(0)
+        try:
+            yield (
+                io.BufferedReader(gzip.GzipFile(fileobj=stream)) if zipped else stream,
+                os.fstat(stream.fileno()).st_size,
+            )
+        except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+            raise FormatError(f"gzip data cut short or damaged ({error})", path) from None
+
+
+def read_bytes(path, most=MAX_BYTES):
     """Whole content of a file, unpacked if it is gzipped (told by its first bytes, not its name).
 
     A byte order mark, which some editors put before UTF-8 text, is left out.
@@ -115,6 +167,8 @@ def read_bytes(path):
     ----------
     path : str or Path
         The file.
+    most : int
+        Bytes that it may hold, unpacked.
 
     Returns
     -------
@@ -124,17 +178,193 @@ def read_bytes(path):
     Raises
     ------
     FormatError
-        If the file is empty, its gzip stream is cut short or damaged, or it holds more than 1 GiB.
+        If the file is empty, no ordinary file (a folder, a device, a pipe), its gzip stream is cut
+        short or damaged, or it holds more than so many bytes, of which no more are read.
     """
-    with open(path, "rb") as stream:
-        zipped = stream.read(2) == b"\x1f\x8b"
-        stream.seek(0)
-        try:
-            content = (gzip.GzipFile(fileobj=stream) if zipped else stream).read(MAX_BYTES + 1)
-        except (EOFError, gzip.BadGzipFile, zlib.error) as error:
-            raise FormatError(f"gzip data cut short or damaged ({error})", path) from None
-    if not content:
+    with _opened(path) as (stream, size):
+        content = io.BytesIO()
+        while size <= most and content.tell() <= most and (piece := stream.read(PIECE)):
+            content.write(piece)
+    if size > most or content.tell() > most:
+        raise FormatError(f"holds more than {most} bytes, the most that is read", path)
+    if not content.tell():
         raise FormatError("the file is empty", path)
-    if len(content) > MAX_BYTES:
-        raise FormatError(f"holds more than {MAX_BYTES} bytes, the most that is read", path)
-    return content.removeprefix(codecs.BOM_UTF8)
+    return content.getvalue().removeprefix(codecs.BOM_UTF8)
+
+
+def read_lines(path):
+    """Lines of a text, one after another, unpacked as by `read_bytes`; never more than one is in memory.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Yields
+    ------
+    bytes
+        With what ends the line.
+
+    Raises
+    ------
+    FormatError
+        As `read_bytes`, and if it is no text, has more than 2 million lines or one of more than a
+        mebibyte, holds more than a gibibyte, or unpacks to more than a hundred times its size.
+    """
+    total = 0
+    with _opened(path) as (stream, size):
+        most = min(MAX_BYTES, MOST_PACKED * size + UNPACKED)
+        for number, line in enumerate(iter(partial(stream.readline, MAX_LINE + 1), b""), 1):
+            if total < 4096 and b"\0" in line[: 4096 - total]:
+                raise FormatError("binary data, where text is expected", path)
+            total += len(line)
+            if total > most:
+                rule = f"{MAX_BYTES} bytes, and {MOST_PACKED} times its size, are the most that is read"
+                raise FormatError(f"holds {total} bytes or more, unpacked: {rule}", path)
+            if len(line) > MAX_LINE:
+                raise FormatError(f"longer than {MAX_LINE} bytes, the most that is read of a line", path, number)
+            if number > MAX_LINES:
+                raise FormatError(f"holds more than {MAX_LINES} lines, the most that is read", path)
+            yield line if number > 1 else line.removeprefix(codecs.BOM_UTF8)
+    if not total:
+        raise FormatError("the file is empty", path)
+
+
+def read_json(path, what):
+    """What a JSON file holds, by the letter of the format (RFC 8259).
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    what : str
+        What it should be, for the error.
+
+    Returns
+    -------
+    dict, list, str, int, float, bool or None
+        Numbers are finite.
+
+    Raises
+    ------
+    FormatError
+        As `read_bytes`, and if it is no JSON, holds more than 64 MiB or more than a million values,
+        NaN or a number that no float holds, or names something twice.
+    """
+    content = read_bytes(path, MAX_JSON)
+    if sum(map(content.count, (b",", b"[", b"{"))) > MAX_VALUES:
+        raise FormatError(f"not {what}: holds more than {MAX_VALUES} values, the most that is read", path)
+    numbers = {"parse_constant": _finite, "parse_float": _finite, "parse_int": _whole}
+    try:
+        return json.loads(content.decode(), object_pairs_hook=_named_once, **numbers)
+    except (ValueError, RecursionError) as error:
+        raise FormatError(f"not {what}: {error}", path) from None
+
+
+def _finite(text):
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"a number must be finite, and no more than a float holds, got {shortened(text, 60)}")
+    return number
+
+
+def _whole(text):
+    if len(text) > 300:  # more digits than a float holds, and perhaps than Python reads
+        _finite(text)
+    return int(text)
+
+
+def _named_once(pairs):
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        twice = Counter(name for name, _ in pairs).most_common(1)[0][0]
+        raise ValueError(f"a name must be given once, got {told(twice)} again")
+    return content
+
+
+def check_fields(where, content, names, optional=()):
+    """Refuse what is not told by its names, all of them and no others.
+
+    Parameters
+    ----------
+    where : str
+        What to call it in the error.
+    content : object
+        What was read.
+    names : iterable of str
+        What there must be.
+    optional : iterable of str
+        What there can be.
+
+    Raises
+    ------
+    ValueError
+        If it is no dict, or with the names that are missing or unknown.
+
+    Examples
+    --------
+    >>> check_fields("a box", {"width": 1.0, "colour": "red"}, ["width"])
+    Traceback (most recent call last):
+    ValueError: a box cannot have colour
+    """
+    names, optional = set(names), set(optional)
+    if not isinstance(content, dict):
+        raise ValueError(f"{where} must have {', '.join(sorted(names))}, got {type(content).__name__}")
+    for said, wrong in (
+        ("lacks", names - set(content)),
+        ("cannot have", set(content) - names - optional),
+    ):
+        if wrong:
+            raise ValueError(f"{where} {said} {shortened(', '.join(sorted(map(str, wrong))), 100)}")
+
+
+def written_number(name, text, most=FARTHEST):
+    """A number as C, YAML and ROS write it: decimal digits, without underscores.
+
+    Parameters
+    ----------
+    name : str
+        What to call it in the error.
+    text : str
+    most : float
+        How far from zero it may be.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        With name, rule and text.
+
+    Examples
+    --------
+    >>> written_number("resolution", "5e-2")
+    0.05
+    >>> written_number("resolution", "1_0")
+    Traceback (most recent call last):
+    ValueError: resolution must be a number, got '1_0'
+    """
+    if not NUMBER.fullmatch(text):
+        raise ValueError(f"{name} must be a number, got {told(text)}")
+    if not abs(float(text)) <= most:
+        raise ValueError(f"{name} must be a number within {most:g}, got {told(text)}")
+    return float(text)
+
+
+def check_cells(columns, rows):
+    """Refuse a map that needs more room than there is, before there is any of it.
+
+    Parameters
+    ----------
+    columns, rows : int or float
+        Cells along x and y, or pixels.
+
+    Raises
+    ------
+    ValueError
+        If they are more than 25 million in all.
+    """
+    if not columns * rows <= MAX_CELLS:
+        raise ValueError(f"{columns:.12g} x {rows:.12g} cells are more than {MAX_CELLS}, the most that a map has")

@@ -2,8 +2,11 @@
 
 from pathlib import Path
 
+from dollop.checks import checked_record, told
 from dollop.formats import carmen_log, ros_bag
 from dollop.formats.files import FormatError
+from dollop.formats.writing import checked_path
+from dollop.laser import LaserLog
 
 __all__ = ["read_log", "read_odometry", "write_log"]
 
@@ -88,7 +91,7 @@ def _is_carmen(path, topic):
         return False
     _check_is_carmen(path)
     if topic is not None:
-        raise ValueError(f"a CARMEN log has no topics, got topic={topic!r}")
+        raise ValueError(f"a CARMEN log has no topics, got topic={told(topic)}")
     return True
 
 
@@ -107,9 +110,10 @@ def write_log(path, log):
     FormatError
         If the name is not one of a CARMEN log.
     ValueError
-        If the beams are not evenly spaced.
+        If the beams are not evenly spaced, or it is no LaserLog.
     """
-    _check_is_carmen(Path(path))
+    checked_record("log", log, LaserLog)
+    _check_is_carmen(checked_path(path))
     carmen_log.write_log(path, log)
 
 

@@ -5,17 +5,32 @@ from pathlib import Path
 
 import numpy as np
 
-from dollop.checks import need
-from dollop.formats.files import FormatError, from_file
+from dollop.checks import checked_array, need
+from dollop.formats.bag_bounds import bound_chunks, check_bag
+from dollop.formats.files import FormatError, check_cells, from_file
 from dollop.formats.odometry import Odometry
 from dollop.formats.ros_frames import Link, laser_poses, planar
-from dollop.formats.scans import Beams, Scan, doubtful, forgive_disorder, no_return_from, usable_scans
+from dollop.formats.scans import (
+    MAX_READINGS,
+    Beams,
+    Scan,
+    check_beams,
+    check_metres,
+    doubtful,
+    forgive_disorder,
+    no_return_from,
+    usable_scans,
+)
 from dollop.laser import LaserLog
 
 __all__ = ["SUFFIXES", "is_bag", "read_log", "read_map", "read_odometry"]
 
 SUFFIXES = (".bag", ".mcap", ".db3")
-SCAN, ODOMETRY, GRID = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "nav_msgs/msg/OccupancyGrid"
+SCAN, ODOMETRY, GRID = (
+    "sensor_msgs/msg/LaserScan",
+    "nav_msgs/msg/Odometry",
+    "nav_msgs/msg/OccupancyGrid",
+)
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 USUAL = {SCAN: None, ODOMETRY: "odom", GRID: "map"}
 """Which topic of a type is meant if there are several and none is named."""
@@ -66,8 +81,9 @@ def read_log(path, topic=None):
     ImportError
         If rosbags is not installed.
     FormatError
-        If the file is no bag, holds no such topic or several to choose from, or more than a few
-        scans are broken.
+        If the file is no bag, holds no such topic or several to choose from, more than a few scans
+        are broken, or one has beams or ranges that no laser has; or if there are more than 100
+        million readings, or what `dollop.formats.bag_bounds` refuses.
 
     Warns
     -----
@@ -76,12 +92,10 @@ def read_log(path, topic=None):
         (`dollop.formats.scans.usable_scans`), or the poses are guesses.
     """
     with _opened(path) as bag:
-        messages = list(_messages(path, bag, SCAN, topic))
-        scans = dict(enumerate(map(_scan, messages), 1))
+        scans, frame = _scans(path, _messages(path, bag, SCAN, topic))
         links, odometry = _links(bag), _driven(bag)
     if not scans:
         raise FormatError("the topic holds no scan", path)
-    frame = messages[0].header.frame_id.strip("/")
     scans, t, notes = usable_scans(path, scans, {})
     beams, ranges = scans[0].beams, np.array([scan.ranges for scan in scans])
     if np.array_equal(t, [scan.t for scan in scans]):
@@ -129,7 +143,8 @@ def read_odometry(path, topic=None):
         rows = [_odometry(message) for message in _messages(path, bag, ODOMETRY, topic)]
     if not rows:
         raise FormatError("the topic holds no odometry", path)
-    rows = np.array(rows)
+    rows = from_file(path, checked_array, "odometry", rows, "N", 7)
+    from_file(path, check_metres, "odometry", rows[:, 1:3])
     rows = rows[forgive_disorder(path, rows[:, 0], "Odometry")]
     return Odometry(rows[:, 0], rows[:, 1:4], rows[:, 5:7])
 
@@ -166,9 +181,13 @@ def read_map(path, topic=None):
     if not grids:
         raise FormatError("the topic holds no map", path)
     frame = grids[-1].info
+    from_file(path, check_cells, frame.width, frame.height)
+    if len(grids[-1].data) != frame.width * frame.height:
+        rule = f"a map of {frame.width} x {frame.height} cells must hold as many"
+        raise FormatError(f"{rule}, got {len(grids[-1].data)}", path)
     percent = np.array(grids[-1].data, float).reshape(frame.height, frame.width)
     x, y, turn, _ = planar(frame.origin.position, frame.origin.orientation)
-    if abs(turn) > 1e-6:
+    if not abs(turn) <= 1e-6:
         raise FormatError(f"a turned map is not supported, got {turn:g} rad", path)
     return np.where(percent < 0, np.nan, percent / 100), (x, y), float(frame.resolution)
 
@@ -177,16 +196,18 @@ def read_map(path, topic=None):
 def _opened(path):
     """The bag, open; whatever rosbags' parsers happen to raise is the file's fault."""
     need("ros")
+    check_bag(path)
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
     try:
         with AnyReader([Path(path)], default_typestore=get_typestore(Stores.LATEST)) as bag:
+            bound_chunks(bag.readers)
             yield bag
     except FormatError:
         raise
     except Exception as error:
-        raise FormatError(f"not a readable ROS bag ({error or type(error).__name__})", path) from None
+        raise FormatError(f"not a readable ROS bag ({str(error) or type(error).__name__})", path) from None
 
 
 def _messages(path, bag, kind, topic):
@@ -213,11 +234,24 @@ def _all_of(bag, wanted):
     return (bag.deserialize(data, c.msgtype) for c, _, data in raw)
 
 
+def _scans(path, messages):
+    """Scans by their number, and the laser's frame."""
+    scans, frame, room = {}, "", MAX_READINGS
+    for number, message in enumerate(messages, 1):
+        scans[number] = from_file(path, _scan, message)
+        frame, room = message.header.frame_id if number == 1 else frame, room - len(message.ranges)
+        if room < 0:
+            raise FormatError(f"more than {MAX_READINGS} readings, the most that is read", path)
+    return scans, frame.strip("/")
+
+
 def _scan(message):
     """A message as a scan, what is no measurement as `inf`."""
     ranges = np.array(message.ranges, dtype=float)
     measured = (ranges >= message.range_min) & (ranges <= message.range_max)
     beams = Beams(ranges.size, message.angle_min, message.angle_increment, message.range_max)
+    check_beams(beams)
+    check_metres("a range", np.where(measured & np.isfinite(ranges), ranges, 0))
     return Scan(beams, np.where(measured, ranges, np.inf), (0, 0, 0), _seconds(message.header.stamp))
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dollop.checks import Note
-from dollop.formats.scans import doubtful
+from dollop.formats.scans import check_metres, doubtful
 from dollop.pose import composed, poses_at
 
 __all__ = ["Link", "laser_poses", "planar"]
@@ -95,8 +95,14 @@ def planar(place, turn):
     -------
     x, y, theta, up : float
         In m and rad, and the cosine of the angle between both axes upwards.
+
+    Raises
+    ------
+    ValueError
+        If a number is NaN or beyond 1e9.
     """
     q = np.array([turn.x, turn.y, turn.z, turn.w])
+    check_metres("the numbers of a transform", np.array([place.x, place.y, *q]))
     x, y, z, w = q / max(np.linalg.norm(q), 1e-12)
     return (
         place.x,

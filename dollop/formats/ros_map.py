@@ -4,18 +4,26 @@ Grey v of the picture, whose first row is the highest y, means the probability (
 unless `negate`; see http://wiki.ros.org/map_server.
 """
 
+import hashlib
+import io
 import os
+import re
+import struct
+import warnings
+from contextlib import suppress
 
 import numpy as np
 import yaml
-from PIL import Image
+from PIL import PngImagePlugin, PpmImagePlugin
 
-from dollop.checks import check_choice
+from dollop.checks import check_choice, told
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.formats.files import FormatError, from_file, read_bytes
-from dollop.formats.writing import whole_file
+from dollop.formats.files import FormatError, check_cells, from_file, read_bytes, written_number
+from dollop.formats.kinds import PGM, ROS_MAP
+from dollop.formats.plain_yaml import plain_nodes
+from dollop.formats.writing import Output, together, whole_file
 
-__all__ = ["read_map", "write_map"]
+__all__ = ["outputs", "picture_of", "read_map", "write_map"]
 
 UNKNOWN_GREY = (127, 128)
 """Written maps have thresholds that make these two greys, and no other, the unknown."""
@@ -25,15 +33,79 @@ RIGHT_ANGLED = 1e-6
 millimetre.
 """
 
-USUAL = {"mode": "trinary", "negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196}
-"""What those keys mean that a map need not have."""
+USUAL = {"mode": "trinary", "negate": "0", "occupied_thresh": "0.65", "free_thresh": "0.196"}
+"""What those keys are that a map need not have."""
+
+NEGATE = {
+    "0": False,
+    "false": False,
+    "no": False,
+    "off": False,
+    "1": True,
+    "true": True,
+    "yes": True,
+    "on": True,
+}
+"""What `negate` can be, in small letters, in capitals or with one."""
+
+MAX_YAML, MAX_NODES = 1 << 16, 1000
+"""Bytes and nodes of the YAML, which holds seven keys, and perhaps others that are passed over."""
+
+MAX_PICTURE, MAX_HEAD = 1 << 27, 1 << 12
+"""Bytes of the picture, and of a PGM's head up to its size: the most cells in text, and some comments."""
+
+PNG, PNM_SIZE = (
+    b"\x89PNG\r\n\x1a\n",
+    re.compile(rb"P[1-6](?:\s|#[^\n\r]*[\n\r])+(\d+)(?:\s|#[^\n\r]*[\n\r])+(\d+)\s"),
+)
+"""How a PNG begins, and a PGM or another of its family, with its size."""
+
+PAIR = re.compile(rb"^# dollop pair ([0-9a-f]{16})$", re.MULTILINE)
+"""The comment by which the two files of a map know each other, in both of them."""
+
+
+def outputs(path):
+    """What `write_map` writes: the YAML, and its picture.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    list of Output
+        The picture lies beside the YAML, or where that is a link, beside the file it points to.
+    """
+    picture = os.path.splitext(os.path.realpath(path) if os.path.islink(path) else path)[0] + ".pgm"
+    return [Output(path, ROS_MAP), Output(picture, PGM, of=path)]
+
+
+def picture_of(path):
+    """The picture that a map names.
+
+    Parameters
+    ----------
+    path : str or Path
+        The YAML.
+
+    Returns
+    -------
+    str or None
+        Its path; None where the map cannot be read, or names none that is there.
+    """
+    with suppress(OSError, ValueError):
+        # If the YAML is a link, beside either.
+        folders = map(os.path.dirname, (path, os.path.realpath(path)))
+        places = [os.path.join(folder, str(_read_keys(path).get("image"))) for folder in folders]
+        return next(filter(os.path.exists, places), None)
 
 
 def write_map(path, occupancy, origin, resolution):
     """Write a map as YAML with a PGM of the same name beside it; both appear, or neither.
 
     Occupied, free and unknown cells come back as they were, in trinary mode of map_server
-    (http://wiki.ros.org/map_server); probabilities come back to a 255th.
+    (http://wiki.ros.org/map_server); probabilities come back to a 255th. Both files carry the same
+    mark, made from what they hold, as a comment: one of another map is told by it.
 
     Parameters
     ----------
@@ -46,7 +118,7 @@ def write_map(path, occupancy, origin, resolution):
     resolution : float
         Side of a cell in m.
     """
-    image = os.path.splitext(path)[0] + ".pgm"
+    image = outputs(path)[1].path
     grey, (low, high) = np.rint(255 * (1 - occupancy)), UNKNOWN_GREY
     occupied, free = occupancy >= OCCUPIED_FROM, occupancy < OCCUPIED_FROM
     sides = np.minimum(grey, low - 1), np.maximum(grey, high + 1)
@@ -55,10 +127,13 @@ def write_map(path, occupancy, origin, resolution):
     meaning = {"negate": 0, "occupied_thresh": 0.505, "free_thresh": 0.495}
     keys = {"image": os.path.basename(image), "mode": "trinary", **place, **meaning}
     layout = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True}
-    with whole_file(path) as stream, whole_file(image) as picture:
-        stream.write(yaml.safe_dump(keys, **layout).encode())
-        stream.flush()  # so that nothing is left to fail once the picture has its name
-        Image.fromarray(grey[::-1]).save(picture, "PPM")
+    text, cells = yaml.safe_dump(keys, **layout).encode(), grey[::-1].tobytes()
+    mark = f"# dollop pair {hashlib.sha256(text + cells).hexdigest()[:16]}\n".encode()
+    with together():
+        with whole_file(image, kind=PGM, of=path) as stream:
+            stream.write(b"P5\n%s%d %d\n255\n" % (mark, *grey.T.shape) + cells)
+        with whole_file(path, kind=ROS_MAP) as stream:
+            stream.write(text + mark)
 
 
 def read_map(path):
@@ -67,7 +142,8 @@ def read_map(path):
     Parameters
     ----------
     path : str or Path
-        The YAML; its picture may be any that Pillow reads, such as PGM and PNG.
+        The YAML, of at most 64 KiB and 1000 nodes, without anchors, aliases and tags; its picture is
+        a PGM or a PNG of at most 128 MiB and 25 million pixels.
 
     Returns
     -------
@@ -82,54 +158,111 @@ def read_map(path):
     Raises
     ------
     FormatError
-        If the YAML or its picture is not in order.
+        If the YAML or its picture is not in order, or each carries the mark of another pair.
     """
     keys = USUAL | _read_keys(path)
     written = keys.get("origin")
-    origin = [_number(path, "origin", v) for v in written] if isinstance(written, list) else []
+    origin = [_number(path, "origin", each) for each in written] if isinstance(written, list) else []
     if len(origin) != 3 or not abs(origin[2]) <= RIGHT_ANGLED:
-        raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {written!r}", path)
+        raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {told(written)}", path)
     resolution = _number(path, "resolution", keys.get("resolution"))
-    grey = _read_grey(path, str(keys.get("image", "")))[::-1]
+    grey = _read_grey(path, keys.get("image"), PAIR.search(read_bytes(path, MAX_YAML)))[::-1]
     return _probabilities(path, keys, grey), origin[:2], resolution
 
 
 def _read_keys(path):
-    """What the YAML holds, a dict."""
-    try:
-        keys = yaml.safe_load(read_bytes(path))
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: a date that is none
-        raise FormatError(f"not YAML: {' '.join(str(error).split())}", path) from None
-    if not isinstance(keys, dict):
-        raise FormatError(f"expected 'key: value' in each line, got {str(keys)[:40]!r}", path)
-    return keys
+    """The keys of a YAML: each a text as it stands there, a list of such, or None if it is something else.
+
+    No object is made of it but these.
+    """
+    return from_file(path, _keys_of, read_bytes(path, MAX_YAML))
+
+
+def _keys_of(content):
+    found, nodes = {}, plain_nodes(content, MAX_NODES)
+    if not isinstance(next(nodes, None), yaml.MappingStartEvent):
+        raise ValueError(f"expected 'key: value' in each line, got {told(content[:60])}")
+    for key in nodes:
+        if isinstance(key, yaml.MappingEndEvent):
+            break
+        name, value = _value(key, nodes), _value(next(nodes), nodes)
+        if not isinstance(name, str) or name in found or name == "<<":
+            raise ValueError(f"a key must be a text, given once, got {told(name)} on line {key.start_mark.line + 1}")
+        found[name] = value
+    if any(isinstance(event, yaml.NodeEvent) for event in nodes):
+        raise ValueError("expected one document, got another after it")
+    return found
+
+
+def _value(event, nodes):
+    """The node that begins with an event: its text, a list of texts, or None; it is gone through to its end."""
+    if isinstance(event, yaml.ScalarEvent):
+        return event.value
+    parts, depth = [], 1
+    while depth:
+        inner = next(nodes)
+        depth += isinstance(inner, yaml.CollectionStartEvent) - isinstance(inner, yaml.CollectionEndEvent)
+        parts.append(getattr(inner, "value", None))
+    return parts[:-1] if isinstance(event, yaml.SequenceStartEvent) else None
 
 
 def _number(path, key, value):
-    """The value as a float: to YAML 1e-9, without a point, is text, and yes is no number."""
-    try:
-        return float(str(value))
-    except ValueError:
-        raise FormatError(f"{key} must be a number, got {value!r}", path) from None
+    """The value of a key as a float."""
+    if not isinstance(value, str):
+        raise FormatError(f"{key} must be a number, got {told(value)}", path)
+    return from_file(path, written_number, key, value)
 
 
-def _read_grey(path, name):
+def _read_grey(path, name, mark):
     """Grey values (H, W) from 0 to 255 of the picture beside a map, of a coloured one the mean as
-    in map_server.
+    in map_server; `mark` is the match of `PAIR` in the YAML.
     """
+    if not isinstance(name, str):
+        raise FormatError(f"image must be the name of its picture, got {told(name)}", path)
     # os.path and not pathlib, for which a name too long or with a zero byte is another error.
-    place = os.path.join(os.path.dirname(path), name)
-    if not os.path.isfile(place):
-        raise FormatError(f"its picture {name!r} is missing", path)
+    folders = map(os.path.dirname, (path, os.path.realpath(path)))  # if the YAML is a link, beside either
+    place = next(filter(os.path.exists, (os.path.join(folder, name) for folder in folders)), None)
+    if place is None:
+        raise FormatError(f"its picture {told(name, 150)} is missing", path)
+    content = read_bytes(place, MAX_PICTURE)
+    kind, size = _kind_and_size(place, content)
+    from_file(place, check_cells, *size)
+    other = PAIR.search(content[:MAX_HEAD]) if kind is PpmImagePlugin.PpmImageFile else None
+    if mark and other and mark[1] != other[1]:
+        rule = f"it is of pair {other[1].decode()}, and {os.path.basename(path)} of pair {mark[1].decode()}"
+        raise FormatError(f"is one half of another run: {rule}", place)
     try:
-        with Image.open(place) as picture:
-            if picture.mode.startswith("I"):  # sixteen bits
-                return np.asarray(picture) / 257
-            colours = np.asarray(picture.convert("RGBA"), float)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # what Pillow would warn of is no map
+            return _grey_of(kind, content, size)
     except Exception as error:  # whatever Pillow's parsers happen to raise
         raise FormatError(f"not a readable picture ({error})", place) from None
+
+
+def _kind_and_size(place, content):
+    """The reader of a PGM or PNG, and its columns and rows by its first bytes: nothing else is tried."""
+    if content.startswith(PNG) and len(content) >= 24:
+        return PngImagePlugin.PngImageFile, struct.unpack(">II", content[16:24])
+    head = PNM_SIZE.match(content[:MAX_HEAD])
+    if head is None:
+        raise FormatError(f"not a readable picture (neither PNG nor PGM with its size in {MAX_HEAD} bytes)", place)
+    return PpmImagePlugin.PpmImageFile, (float(head[1]), float(head[2]))
+
+
+def _grey_of(kind, content, size):
+    """Grey values (H, W) of a picture."""
+    with kind(io.BytesIO(content)) as picture:
+        if picture.size != size:
+            raise ValueError(f"two sizes, {size} and {picture.size}")
+        if picture.mode == "F":
+            raise ValueError("a map has whole numbers, this one has none")
+        if picture.mode.startswith("I"):  # sixteen bits
+            return np.asarray(picture) / 257
+        if picture.mode in ("1", "L") and "transparency" not in picture.info:
+            return np.asarray(picture.convert("L"), float)
+        colours = np.asarray(picture.convert("RGBA"))
     if (colours[..., 3] < 255).any():
-        raise FormatError("a map must have no transparent pixels", place)
+        raise ValueError("a map must have no transparent pixels")
     return colours[..., :3].mean(axis=2)
 
 
@@ -139,15 +272,25 @@ def _probabilities(path, keys, grey):
     """
     mode = keys["mode"]
     from_file(path, check_choice, "mode", mode, ("trinary", "scale", "raw"))
-    from_file(path, check_choice, "negate", keys["negate"], (0, 1))  # or false and true
     below, above = (_number(path, key, keys[key]) for key in ("free_thresh", "occupied_thresh"))
     if not 0 <= below <= above <= 1:
         rule = "thresholds must be 0 <= free_thresh <= occupied_thresh <= 1"
         raise FormatError(f"{rule}, got free_thresh {below:g} and occupied_thresh {above:g}", path)
+    negate = _negate(path, keys["negate"])
     if mode == "raw":
         return np.where(grey <= 100, grey / 100, np.nan)
-    probability = (grey if keys["negate"] else 255 - grey) / 255
+    probability = (grey if negate else 255 - grey) / 255
     occupied, free = probability > above, probability < below
-    just_free = np.nextafter(OCCUPIED_FROM, 0)
-    sides = np.maximum(probability, OCCUPIED_FROM), np.minimum(probability, just_free)
-    return np.select([occupied, free], sides, np.nan if mode == "trinary" else probability)
+    np.maximum(probability, OCCUPIED_FROM, out=probability, where=occupied)
+    np.minimum(probability, np.nextafter(OCCUPIED_FROM, 0), out=probability, where=free)
+    if mode == "trinary":
+        probability[~(occupied | free)] = np.nan
+    return probability
+
+
+def _negate(path, value):
+    """Whether dark is free: what `negate` says."""
+    text = value if isinstance(value, str) and value in (value.lower(), value.upper(), value.capitalize()) else ""
+    if text.lower() not in NEGATE:
+        raise FormatError(f"negate must be one of {', '.join(NEGATE)}, got {told(value)}", path)
+    return NEGATE[text.lower()]

@@ -6,12 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dollop.checks import Note
+from dollop.checks import FARTHEST, Note, told
 from dollop.formats.files import FormatError, warn_of
 
 __all__ = [
+    "MAX_READINGS",
     "Beams",
     "Scan",
+    "check_beams",
+    "check_metres",
     "doubtful",
     "forgive",
     "forgive_disorder",
@@ -37,6 +40,11 @@ readings of a wall vary with the laser's noise."""
 WIDE = np.radians(30)
 """Bearings in rad that a pile must spread over: the end of a corridor may be read alike often, but it is
 narrow."""
+MAX_BEAMS, MAX_READINGS = 36_000, 100_000_000
+"""Beams of a scan, a hundredth of a degree apart all round, and readings of a log: ten hours of ten scans of
+271 beams a second, for which a gigabyte is needed."""
+FULL_TURN = 2 * np.pi + 1e-6
+"""rad that beams may spread over, and what rounding adds."""
 
 
 class Beams(NamedTuple):
@@ -89,6 +97,46 @@ class Scan(NamedTuple):
     ranges: np.ndarray
     pose: tuple
     t: float
+
+
+def check_beams(beams):
+    """Refuse beams that no laser has.
+
+    Parameters
+    ----------
+    beams : Beams
+
+    Raises
+    ------
+    ValueError
+        If they are more than 36,000 or none, spread over more than a full turn or over nothing, or begin
+        farther than a full turn from straight ahead.
+    """
+    if not 1 <= beams.count <= MAX_BEAMS:
+        raise ValueError(f"a scan must have 1 to {MAX_BEAMS} beams, got {told(beams.count)}")
+    spread = abs(beams.step) * (beams.count - 1)
+    if not (spread <= FULL_TURN and abs(beams.start) <= FULL_TURN) or beams.step == 0:
+        raise ValueError(f"beams must spread over at most a full turn, got {told(str(beams), 100)}")
+
+
+def check_metres(name, values):
+    """Refuse numbers that are no metres.
+
+    Parameters
+    ----------
+    name : str
+        What to call them in the error.
+    values : (N,) float array
+        In m; at least one.
+
+    Raises
+    ------
+    ValueError
+        If one is NaN, or farther than 1e9 m.
+    """
+    farthest = np.abs(values).max()
+    if not farthest <= FARTHEST:
+        raise ValueError(f"{name} must be within {FARTHEST:g} m, got {farthest:g} m")
 
 
 def usable_scans(path, scans, bad):

@@ -3,6 +3,7 @@
 Nothing here needs PyBullet.
 """
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,8 @@ import pandas as pd
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
-from dollop.checks import checked_array
-from dollop.formats.files import FormatError
+from dollop.checks import checked_array, checked_positions
+from dollop.formats.files import FormatError, from_file, read_bytes
 from dollop.lab.driving import planned_poses
 from dollop.lab.outlines import outline_distances
 from dollop.lab.person import DEPTH, SHOULDERS, TIME_STEP, Walk, check_room, walk, walk_along
@@ -29,6 +30,8 @@ CELL = 0.10
 """Side in m of the cells in which a way is sought."""
 FRAMES_PER_SECOND = 29.97
 """Of the recordings that `read_walks` reads."""
+MAX_WALKS = 1 << 28
+"""Bytes of one of them, unpacked."""
 WALK_COLUMNS = ["id", "frame", "label", "x_est", "y_est"]
 
 
@@ -76,7 +79,12 @@ def walk_of(person, scene):
     points, numbers = closely(places[visited])
     points = points + rng.normal(0.0, person.scatter, points.shape) * (person.scatter > 0)
     stops = [(int(numbers[i]), seconds) for k, seconds in person.stops for i in np.flatnonzero(visited == k)]
-    gait = {"speed": person.speed, "stand": (person.begin, AFTERWARDS), "body": person.body, "stops": stops}
+    gait = {
+        "speed": person.speed,
+        "stand": (person.begin, AFTERWARDS),
+        "body": person.body,
+        "stops": stops,
+    }
     return walk(points, scene, rng, **gait)
 
 
@@ -330,7 +338,7 @@ def read_walks(folder):
     Raises
     ------
     FormatError
-        If there is no such file, or one is something else.
+        If there is no such file, or one is something else or holds more than 256 MiB.
     """
     paths = sorted(Path(folder).glob("*.csv*"))
     if not paths:
@@ -338,11 +346,15 @@ def read_walks(folder):
     walks = []
     for path in paths:
         try:
-            table = pd.read_csv(path)
-            table = table[table[WALK_COLUMNS].label == "ped"].astype(dict.fromkeys(["frame", "x_est", "y_est"], float))
-            people = table.groupby("id")
-        except (ValueError, KeyError, OSError, EOFError, TypeError) as error:
-            raise FormatError(f"not a table of walks with {', '.join(WALK_COLUMNS)}: {error}", path) from error
+            numbers = dict.fromkeys(["frame", "x_est", "y_est"], float)
+            content = io.BytesIO(read_bytes(path, MAX_WALKS))
+            table = pd.read_csv(content, usecols=WALK_COLUMNS, dtype=numbers, low_memory=False)
+        except ValueError as error:
+            raise FormatError(f"not a table of walks with {', '.join(WALK_COLUMNS)}: {error}", path) from None
+        walked = table[table.label == "ped"]
+        from_file(path, checked_positions, "x_est and y_est", walked[["x_est", "y_est"]])
+        from_file(path, checked_array, "frame", walked.frame, "N")
+        people = walked.groupby("id")
         for _, rows in people:
             t = (rows.frame - rows.frame.iloc[0]) / FRAMES_PER_SECOND
             walks.append(np.column_stack([t, rows.x_est, rows.y_est]).astype(float))

@@ -7,15 +7,17 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from dollop.formats.files import FormatError
+from dollop.formats.files import FormatError, read_bytes, written_number
+from dollop.formats.kinds import CARMEN_LOG, SCENE, TRUTH
 from dollop.formats.logs import read_log, write_log
-from dollop.formats.writing import whole_file
+from dollop.formats.writing import Output, together, whole_file
 from dollop.lab.scenes import Scene
 from dollop.laser import LaserLog
 
-__all__ = ["MOVED_COLUMNS", "ROBOT_COLUMNS", "Recording", "TRUTH_COLUMNS"]
+__all__ = ["MOVED_COLUMNS", "ROBOT_COLUMNS", "Recording", "TRUTH_COLUMNS", "outputs"]
 
 TRUTH_COLUMNS = ["t", "x", "y", "heading"]
 """Of the first person; the others' end in their number: x_1, y_1, heading_1."""
@@ -23,6 +25,8 @@ MOVED_COLUMNS = ["object_x", "object_y"]
 """Of an object that is moved, which end in its number: object_x_0, object_y_0."""
 ROBOT_COLUMNS = ["laser_x", "laser_y", "laser_theta"]
 """True pose of the laser, where its robot drives."""
+MAX_TRUTH, LARGEST = 64 << 20, 1e10
+"""Bytes of the truth, and the largest number in it: times may be seconds since 1970."""
 
 
 @dataclass(frozen=True)
@@ -49,19 +53,25 @@ class Recording:
         return f"Recording: {self.log}; {self.scene}"
 
     def save(self, path):
-        """Write the log, and beside it the truth and the scene.
+        """Write the log, and beside it the truth and the scene: all of them, or none.
 
         Parameters
         ----------
         path : str or Path
             Of a CARMEN log, .log or .log.gz. For `walk.log.gz` the others are `walk_truth.csv` and
             `walk_scene.json`.
+
+        Raises
+        ------
+        OSError
+            Where a file cannot be written, or what is there is of another kind.
         """
-        write_log(path, self.log)
         truth, scene = companions(path)
-        with whole_file(truth, "w") as stream:
-            self.truth.to_csv(stream, index=False, float_format="%.4f")
-        self.scene.save(scene)
+        with together():
+            with whole_file(truth, "w", TRUTH) as stream:
+                self.truth.to_csv(stream, index=False, float_format="%.4f")
+            self.scene.save(scene)
+            write_log(path, self.log)
 
     @classmethod
     def load(cls, path):
@@ -79,26 +89,57 @@ class Recording:
         Raises
         ------
         FormatError
-            If a file is not what it should be, or the truth has not one line for each scan.
+            If a file is missing or not what it should be, or the truth is larger than 64 MiB or has not
+            one line for each scan.
         """
         log = read_log(path)
         truth_path, scene_path = companions(path)
+        for each in (truth_path, scene_path):
+            if not each.exists():
+                raise FormatError("a recording has its truth and its scene beside its log, this is missing", each)
         return cls(log, load_truth(truth_path, len(log)), Scene.load(scene_path))
+
+
+def outputs(path):
+    """What `Recording.save` writes.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the log.
+
+    Returns
+    -------
+    list of Output
+        Log, truth and scene.
+    """
+    truth, scene = companions(path)
+    return [Output(path, CARMEN_LOG), Output(truth, TRUTH), Output(scene, SCENE)]
 
 
 def load_truth(path, n_scans):
     """Read the walker's true states, one line for each of `n_scans` scans."""
-    try:
-        truth = pd.read_csv(path, dtype=float)
-    except ValueError as error:
-        raise FormatError(f"not a table of numbers: {error}", path) from error
-    kinds = {re.sub(r"_\d+$", "", name) for name in truth.columns}
+    names, *lines = read_bytes(path, MAX_TRUTH).decode(errors="replace").splitlines()
+    names = names.split(",")
+    kinds = {re.sub(r"_\d+$", "", name) for name in names}
     known = {*TRUTH_COLUMNS, *MOVED_COLUMNS, *ROBOT_COLUMNS}
-    if "t" not in truth or not kinds <= known or len(truth) not in (0, n_scans):
-        rule = f"columns must be t and of {sorted(known - {'t'})}, and rows {n_scans}, one for each scan"
-        got = f"got {', '.join(map(str, truth.columns))} and {len(truth)}"
-        raise FormatError(f"{rule}, or none if nothing moves, {got}", path)
-    return truth
+    if "t" not in names or not kinds <= known or len(set(names)) < len(names) or len(lines) not in (0, n_scans):
+        rule = f"columns must be t and of {', '.join(sorted(known - {'t'}))}, and rows {n_scans}, one for each scan"
+        raise FormatError(f"{rule}, or none if nothing moves, got {', '.join(names)} and {len(lines)}", path)
+    rows = [_row(path, names, line, number) for number, line in enumerate(lines, 2)]
+    return pd.DataFrame(np.reshape(rows, (-1, len(names))).astype(float), columns=names)
+
+
+def _row(path, names, line, number):
+    """The numbers of a line of the truth."""
+    values = line.split(",")
+    if len(values) != len(names):
+        rule = f"not a table of numbers: a line must hold one for each of {len(names)} columns"
+        raise FormatError(f"{rule}, got {len(values)}", path, number)
+    try:
+        return [written_number(name, value.strip(), LARGEST) for name, value in zip(names, values, strict=True)]
+    except ValueError as error:
+        raise FormatError(f"not a table of numbers: {error}", path, number) from None
 
 
 def companions(path):

@@ -10,10 +10,36 @@ from functools import cached_property
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_number, checked_numbers, checked_positions, put_in
-from dollop.lab.outlines import Outline, crosses_itself, gaps, inside, outline_distances, wall_distances
+from dollop.checks import (
+    FARTHEST,
+    check_choice,
+    check_positive,
+    checked_array,
+    checked_number,
+    checked_positions,
+    put_in,
+)
+from dollop.lab.outlines import (
+    Outline,
+    crosses_itself,
+    gaps,
+    inside,
+    outline_distances,
+    wall_distances,
+)
 
-__all__ = ["GREY", "LABORATORY", "OAK", "Part", "Room", "STEEL", "WALL_THICKNESS", "WHITE", "panel", "walls"]
+__all__ = [
+    "GREY",
+    "LABORATORY",
+    "OAK",
+    "Part",
+    "Room",
+    "STEEL",
+    "WALL_THICKNESS",
+    "WHITE",
+    "panel",
+    "walls",
+]
 
 WALL_THICKNESS = 0.10
 MOST_CORNERS, LARGEST = 100, 200.0
@@ -54,8 +80,11 @@ class Part:
     def __post_init__(self):
         check_choice("shape", self.shape, ("box", "cylinder"))
         for name in ("centre", "size", "colour"):
-            object.__setattr__(self, name, tuple(checked_numbers(name, getattr(self, name), 3).tolist()))
+            values = checked_array(name, getattr(self, name), 3, least=-FARTHEST, most=FARTHEST)
+            object.__setattr__(self, name, tuple(values.tolist()))
         check_positive("size", min(self.size))
+        if max(self.size) > LARGEST:
+            raise ValueError(f"a part must be at most {LARGEST:g} m large, got {self.size}")
         if self.shape == "cylinder" and self.size[0] != self.size[1]:
             raise ValueError(f"a cylinder must be as deep as wide, got {self.size[:2]}")
         put_in(self, turn=checked_number("turn", self.turn))
@@ -115,7 +144,7 @@ class Room:
     height: float = 2.4
 
     def __post_init__(self):
-        corners = checked_numbers("the corners of a room", self.corners, "N", 2)
+        corners = checked_array("the corners of a room", self.corners, "N", 2)
         corners = checked_positions("the corners of a room", corners)
         if len(corners) < 3:
             raise ValueError(f"a room needs three corners or more, got {len(corners)}")
@@ -244,7 +273,10 @@ def walls_round(corners, height):
     lengths, along, arriving = directions(corners)
     flat = np.abs(along[:, 0])
     convex = arriving[:, 0] * along[:, 1] > arriving[:, 1] * along[:, 0]
-    begins, ends = convex & (flat >= np.roll(flat, 1)), np.roll(convex, -1) & (flat > np.roll(flat, -1))
+    begins, ends = (
+        convex & (flat >= np.roll(flat, 1)),
+        np.roll(convex, -1) & (flat > np.roll(flat, -1)),
+    )
     parts = []
     for k, corner in enumerate(corners):
         first, last = -WALL_THICKNESS * begins[k], lengths[k] + WALL_THICKNESS * ends[k]

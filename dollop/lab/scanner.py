@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dollop.checks import check_choice, checked_number
+from dollop.checks import check_choice, checked_number, told
 
 __all__ = ["MODELS", "SCAN_RATES", "Scanner", "SickLMS200", "SickTiM571", "UTM30LX", "mix_pixels"]
 
@@ -82,7 +82,7 @@ class Scanner:
 
     def __post_init__(self):
         if not isinstance(self.model, str):
-            raise ValueError(f"model must be a name, got {self.model!r:.60}")
+            raise ValueError(f"model must be a name, got {told(self.model)}")
         for name, (least, most) in RANGES.items():
             checked_number(name, getattr(self, name), least, most)
         if abs(1 / self.step - round(1 / self.step)) > 1e-6:

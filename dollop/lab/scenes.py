@@ -10,8 +10,9 @@ from functools import partial
 
 import numpy as np
 
-from dollop.checks import checked_numbers, put_in
-from dollop.formats.files import FormatError, from_file, read_bytes
+from dollop.checks import checked_array, put_in, told
+from dollop.formats.files import check_fields, from_file, read_json
+from dollop.formats.kinds import SCENE
 from dollop.formats.writing import whole_file
 from dollop.lab.outlines import Outline, gaps
 from dollop.lab.person import SHOULDERS
@@ -30,6 +31,10 @@ __all__ = [
 ]
 
 FORMAT, VERSION = "dollop scene", 1
+MOST = 1000
+"""Objects, people, moves and parts of furniture in a file: each is set against each of the others."""
+LONGEST_WAY = 1000.0
+"""m that a robot drives at most: an hour at its usual speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +148,7 @@ class Scene:
         ValueError
             If an object does not stand free there.
         """
-        places = checked_numbers("positions", positions, len(self.objects), 2)
+        places = checked_array("positions", positions, len(self.objects), 2)
         return replace(self, objects=tuple(map(Object.at, self.objects, places)))
 
     def save(self, path):
@@ -152,8 +157,13 @@ class Scene:
         Parameters
         ----------
         path : str or Path
+
+        Raises
+        ------
+        OSError
+            Where the file cannot be written, or what is there is not a scene.
         """
-        with whole_file(path, "w") as stream:
+        with whole_file(path, "w", SCENE) as stream:
             json.dump(self.to_dict(), stream)
 
     @classmethod
@@ -171,13 +181,9 @@ class Scene:
         Raises
         ------
         FormatError
-            If the file is no scene, damaged, or of another version.
+            If the file is no scene, damaged, of another version, or has more than 1000 of anything.
         """
-        try:
-            content = json.loads(read_bytes(path))
-        except (ValueError, RecursionError) as error:
-            raise FormatError(f"not a scene: {error}", path) from error
-        return from_file(path, cls.from_dict, content)
+        return from_file(path, cls.from_dict, read_json(path, "a scene"))
 
     def to_dict(self):
         """The scene as plain lists and numbers, for JSON.
@@ -210,9 +216,9 @@ class Scene:
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise ValueError(f"not a scene: format must be {FORMAT!r}")
         if content.get("version") is not VERSION:
-            raise ValueError(f"the version of a scene must be {VERSION}, got {content.get('version')!r}")
+            raise ValueError(f"the version of a scene must be {VERSION}, got {told(content.get('version'))}")
         content = {name: value for name, value in content.items() if name not in ("format", "version")}
-        check_names("a scene", content, {each.name for each in fields(cls)})
+        check_fields("a scene", content, {each.name for each in fields(cls)})
         lists = {"objects": Object, "people": Person, "moves": Move}
         lists = {name: all_made(name, kind, content[name]) for name, kind in lists.items()}
         furniture = partial(all_made, "furniture", Part)
@@ -235,27 +241,20 @@ def plain(value):
 def made(where, kind, content, **parts):
     """A record from what `plain` told of it; parts of it are made by functions; errors say where."""
     names = {each.name for each in fields(kind)}
-    check_names(where, content, names)
+    check_fields(where, content, names)
     values = {name: parts[name](value) if name in parts else value for name, value in content.items()}
     try:
         return kind(**values)
-    except (ValueError, TypeError, OverflowError) as error:
+    except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
-
-
-def check_names(where, content, names):
-    """What is told of a record must be a dictionary with its names, all of them and no others."""
-    if not isinstance(content, dict):
-        raise ValueError(f"{where} must have {', '.join(sorted(names))}, got {type(content).__name__}")
-    for said, wrong in (("lacks", names - set(content)), ("cannot have", set(content) - names)):
-        if wrong:
-            raise ValueError(f"{where} {said} {', '.join(sorted(map(str, wrong))):.100}")
 
 
 def all_made(name, kind, content):
     """A record of each in a list."""
     if not isinstance(content, list):
         raise ValueError(f"{name} must be a list, got {type(content).__name__}")
+    if len(content) > MOST:
+        raise ValueError(f"{name} must be at most {MOST}, got {len(content)}")
     return tuple(made(f"{name}[{k}]", kind, each) for k, each in enumerate(content))
 
 
@@ -274,8 +273,8 @@ def check_objects(scene):
     outlines = [each.footprint for each in scene.objects]
     for i, outline in enumerate(outlines):
         for j in np.flatnonzero(gaps(outlines[:i], outline) < 0):
-            told = f"object {j} at {rounded(outlines[j])} and object {i} at {rounded(outline)}"
-            raise ValueError(f"objects must not stand in each other, got {told}")
+            both = f"object {j} at {rounded(outlines[j])} and object {i} at {rounded(outline)}"
+            raise ValueError(f"objects must not stand in each other, got {both}")
 
 
 def check_free(scene, name, outline):
@@ -290,7 +289,12 @@ def check_robot(scene):
     if robot.beam_height >= scene.room.height:
         rule = f"the beam must be below the top of the walls, {scene.room.height} m"
         raise ValueError(f"{rule}, got {robot.beam_height} m")
-    stretches = [np.linspace(a, b, 2 + int(np.hypot(*np.subtract(b, a)) / 0.1)) for a, b in robot_lines(robot)]
+    longest = np.hypot(*np.ptp(scene.room.corners, axis=0))  # what is longer leaves the room, however closely looked at
+    lengths = [min(np.hypot(*np.subtract(b, a)), longest) for a, b in robot_lines(robot)]
+    if sum(lengths) > LONGEST_WAY:
+        raise ValueError(f"the robot's way must be at most {LONGEST_WAY:g} m long, got {sum(lengths):g} m")
+    ends = zip(robot_lines(robot), lengths, strict=True)
+    stretches = [np.linspace(a, b, 2 + int(length / 0.1)) for (a, b), length in ends]
     for name, place in (
         ("the robot", robot.pose),
         *(("the robot's way", place) for each in stretches for place in each),
@@ -329,7 +333,7 @@ def check_moves(scene):
     for move in sorted(scene.moves, key=lambda each: each.begin):
         known = isinstance(move.object, int | np.integer) and not isinstance(move.object, bool)
         if not (known and 0 <= move.object < len(scene.objects)):
-            raise ValueError(f"a move must be of one of {len(scene.objects)} objects, got {move.object!r:.60}")
+            raise ValueError(f"a move must be of one of {len(scene.objects)} objects, got {told(move.object)}")
         name, each = f"object {move.object}, when moved,", objects[move.object].at(move.to)
         check_free(scene, name, each.footprint)
         objects[move.object] = each
@@ -337,8 +341,8 @@ def check_moves(scene):
         if not scene.robot.way:
             others.append(Outline(*scene.robot.pose[:2], radius=scene.robot.radius))
         for k in np.flatnonzero(gaps(others, each.footprint) < 0):
-            told = f"{rounded(move.to)}, in what is at {rounded(others[k])}"
-            raise ValueError(f"{name} must not stand in anything, got {told}")
+            both = f"{rounded(move.to)}, in what is at {rounded(others[k])}"
+            raise ValueError(f"{name} must not stand in anything, got {both}")
 
 
 def object_gaps(scene):

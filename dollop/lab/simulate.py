@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from dollop.checks import checked_number, checked_positions
+from dollop.checks import checked_number, checked_positions, told
 from dollop.lab import person
 from dollop.lab.driving import ARRIVED, pursue
 from dollop.lab.people import walks_of
@@ -252,7 +252,7 @@ def record_tour(scene, places, seed, stride=0.15, turns=12):
     checked_number("stride", stride, 0.01)
     checked_number("turns", turns, 1)
     if not len(places) or not (scene.room.distance(places) > 0).all():
-        raise ValueError(f"the places of a tour must be in the room and free, got {places.tolist()!r:.100}")
+        raise ValueError(f"the places of a tour must be in the room and free, got {told(places.tolist())}")
     poses = [(*places[0], theta) for theta in np.arange(turns) * 2 * np.pi / turns]
     for begin, end in zip(places[:-1], places[1:], strict=True):
         heading = np.arctan2(*(end - begin)[::-1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, checked_number, checked_numbers, checked_positions, put_in
+from dollop.checks import check_choice, check_positive, checked_array, checked_number, checked_positions, put_in, told
 from dollop.lab.outlines import Outline
 from dollop.lab.scanner import Scanner, SickLMS200
 from dollop.pose import moved_pose
@@ -74,10 +74,19 @@ class Object:
     def __post_init__(self):
         check_choice("shape", self.shape, SHAPES)
         for name in ("position", "size"):
-            object.__setattr__(self, name, tuple(checked_numbers(name, getattr(self, name), 2).tolist()))
+            values = checked_array(name, getattr(self, name), 2, least=-FARTHEST, most=FARTHEST)
+            object.__setattr__(self, name, tuple(values.tolist()))
         check_positive("size", min(self.size))
-        numbers = {"height": (1e-3, FARTHEST), "turn": (-FARTHEST, FARTHEST), "top": (0, 100), "foot": (0, 100)}
-        put_in(self, **{name: checked_number(name, getattr(self, name), *ends) for name, ends in numbers.items()})
+        numbers = {
+            "height": (1e-3, FARTHEST),
+            "turn": (-FARTHEST, FARTHEST),
+            "top": (0, 100),
+            "foot": (0, 100),
+        }
+        put_in(
+            self,
+            **{name: checked_number(name, getattr(self, name), *ends) for name, ends in numbers.items()},
+        )
         if max(*self.size, self.height) > LARGEST:
             raise ValueError(f"an object must be at most {LARGEST:g} m large, got {self.size} and {self.height}")
         if self.shape != "box" and self.size[0] != self.size[1]:
@@ -198,13 +207,16 @@ class Robot:
     radius: float = 0.25
 
     def __post_init__(self):
-        object.__setattr__(self, "pose", tuple(checked_numbers("the robot's pose", self.pose, 3).tolist()))
+        object.__setattr__(self, "pose", as_pose("the robot's pose", self.pose))
         object.__setattr__(self, "way", as_places("the robot's way", self.way))
         put_in(self, speed=checked_number("the robot's speed", self.speed, 0.01, 2))
         put_in(self, radius=checked_number("the robot's radius", self.radius, 0.05, 2))
-        put_in(self, laser_ahead=checked_number("laser_ahead", self.laser_ahead, -self.radius, self.radius))
+        put_in(
+            self,
+            laser_ahead=checked_number("laser_ahead", self.laser_ahead, -self.radius, self.radius),
+        )
         if not isinstance(self.scanner, Scanner):
-            raise ValueError(f"the robot's scanner must be a Scanner, got {self.scanner!r:.60}")
+            raise ValueError(f"the robot's scanner must be a Scanner, got {told(self.scanner)}")
         checked_number("the beam height", self.beam_height)
         if not LOWEST_BEAM < self.beam_height < HIGHEST_BEAM:
             rule = f"the beam height must be over feet, {LOWEST_BEAM} m, and below shoulders, {HIGHEST_BEAM} m"
@@ -263,25 +275,32 @@ class Person:
 
     def __post_init__(self):
         object.__setattr__(self, "places", as_places("a person's places", self.places))
-        object.__setattr__(self, "times", tuple(checked_numbers("times", self.times, "K").tolist()))
+        object.__setattr__(self, "times", tuple(checked_array("times", self.times, "K").tolist()))
         if not self.places:
             raise ValueError("a person needs a place to be, got none")
         check_choice("body", self.body, BODIES)
         put_in(self, speed=checked_number("a person's speed", self.speed, 0.1, 3))
         put_in(self, begin=checked_number("begin", self.begin, 0, LONGEST))
         put_in(self, scatter=checked_number("scatter", self.scatter, 0, 1))
-        check_choice("back", self.back, (False, True))
-        put_in(self, laps=whole("laps", self.laps, 1, MOST_LAPS), seed=whole("seed", self.seed, 0, 2**63))
+        if not isinstance(self.back, bool | np.bool_):
+            raise ValueError(f"back must be one of False, True, got {told(self.back)}")
+        put_in(
+            self,
+            laps=whole("laps", self.laps, 1, MOST_LAPS),
+            seed=whole("seed", self.seed, 0, 2**63),
+        )
+        check_pairs("stops", self.stops)
         for k, seconds in self.stops:
             checked_number("the time of a stop", seconds, 0.01, LONGEST)
             if isinstance(k, bool) or k not in range(len(self.places)):
-                raise ValueError(f"a stop must be at one of {len(self.places)} places, got place {k}")
+                raise ValueError(f"a stop must be at one of {len(self.places)} places, got place {told(k)}")
         put_in(self, stops=tuple((int(k), float(seconds)) for k, seconds in self.stops))
         if self.times and (len(self.times) != len(self.places) or min(np.diff(self.times), default=1) <= 0):
             rule = f"times must increase, one for each of {len(self.places)} places"
             raise ValueError(f"{rule}, got {len(self.times)}")
         steps = np.linalg.norm(np.diff(self.places, axis=0), axis=1)
         if self.times:
+            checked_number("the last of the times", max(self.times, key=abs), -FARTHEST, FARTHEST)
             fastest = (steps / np.diff(self.times)).max(initial=0)
             if fastest > FASTEST or np.ptp(self.times) > LONGEST:
                 rule = f"a replayed walk must be at most {FASTEST:g} m/s fast and {LONGEST:g} s long"
@@ -317,22 +336,35 @@ class Move:
     seconds: float = 1.0
 
     def __post_init__(self):
-        object.__setattr__(self, "to", tuple(checked_numbers("to", self.to, 2).tolist()))
+        to = checked_array("to", self.to, 2, least=-FARTHEST, most=FARTHEST)
+        object.__setattr__(self, "to", tuple(to.tolist()))
         put_in(self, begin=checked_number("begin", self.begin, 0, LONGEST))
         put_in(self, seconds=checked_number("seconds", self.seconds, 0.01, LONGEST))
+
+
+def check_pairs(name, values):
+    """Refuse what is no sequence of pairs."""
+    pairs = isinstance(values, tuple | list) and all(isinstance(each, tuple | list) for each in values)
+    if not pairs or any(len(each) != 2 for each in values):
+        raise ValueError(f"{name} must be a sequence of pairs, got {told(values)}")
 
 
 def whole(name, value, least, most):
     """A whole number within bounds as an int."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer) or not least <= value <= most:
-        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {value!r:.60}")
+        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {told(value)}")
     if value != int(value):
-        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {value}")
+        raise ValueError(f"{name} must be a whole number, {least} to {most}, got {told(value)}")
     return int(value)
+
+
+def as_pose(name, values):
+    """A pose (3,) as a tuple."""
+    return tuple(checked_array(name, values, 3, least=-FARTHEST, most=FARTHEST).tolist())
 
 
 def as_places(name, values):
     """Places (K, 2) as a tuple of tuples."""
     if isinstance(values, tuple | list) and not values:
         return ()
-    return tuple(map(tuple, checked_positions(name, checked_numbers(name, values, "N", 2)).tolist()))
+    return tuple(map(tuple, checked_positions(name, checked_array(name, values, "N", 2)).tolist()))

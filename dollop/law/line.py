@@ -34,10 +34,10 @@ from math import exp, hypot
 
 import numpy as np
 
-from dollop.lds import powers_on
+from dollop.lds import MOST_STEPS, powers_on
 from dollop.trajectory import arc_length
 
-__all__ = ["FADE", "Fading", "Line", "lines_of"]
+__all__ = ["FADE", "Fading", "Line", "check_ends", "lines_of"]
 
 FADE = 0.15
 """m of way over which an offset from the line fades to 1/e: about the distance between the wheels and
@@ -90,6 +90,11 @@ class Line:
         Line
             Its places lie at most a 64th of the way apart, on the smooth (Catmull-Rom) curve
             through the states.
+
+        Raises
+        ------
+        ValueError
+            See `check_ends`.
 
         Examples
         --------
@@ -152,6 +157,11 @@ class Line:
         offsets : (M, 2) float array
             From them, m.
 
+        Raises
+        ------
+        ValueError
+            See `check_ends`.
+
         Examples
         --------
         Pushed aside by half a metre, it is back on a straight line within one.
@@ -170,6 +180,7 @@ class Line:
         offsets = [fading.offset(i) for i in range(at, len(self.places))]
         last = len(self.places)
         while np.hypot(*offsets[-1]) > reach:
+            check_ends(last - len(self.places), self.places[-1], reach)
             offsets.append(fading.offset(last))
             last += 1
         rest = np.tile(places[-1], (len(offsets) - len(places), 1))
@@ -237,14 +248,40 @@ class Fading:
         )
 
 
+def check_ends(steps, goal, reach):
+    """Refuse to follow a response any longer that has not come within reach of its subgoal.
+
+    Every one comes there, but some do so too late: where an LDS hardly decays, or where
+    coordinates are so large that none need lie within reach of another.
+
+    Parameters
+    ----------
+    steps : int
+        So many were taken.
+    goal : (2,) float array
+        m.
+    reach : float
+        m.
+
+    Raises
+    ------
+    ValueError
+        From 100,000 steps on (`dollop.lds.MOST_STEPS`).
+    """
+    if steps >= MOST_STEPS:
+        rule = f"a response must come within {reach:g} m of its subgoal in {MOST_STEPS} steps"
+        raise ValueError(f"{rule}, got one to ({goal[0]:.6g}, {goal[1]:.6g}) that does not")
+
+
 def states_to(lds, start, reach):
     """States (N, 2) of an LDS from a start to the last one that is not within reach of its subgoal."""
     offset, count = start - lds.goal, 64
     while True:
-        states = powers_on(lds.A, offset, count)
+        states = powers_on(lds.A, offset, min(count, MOST_STEPS))
         near = np.hypot(*states.T) <= reach
         if near.any():
             return lds.goal + states[: max(int(near.argmax()), 1)]
+        check_ends(count, lds.goal, reach)
         count *= 4
 
 

@@ -7,7 +7,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from dollop.trajectory import arc_length, at_arc_length
 
-__all__ = ["CORNER", "PARTS", "Stands", "shown_pauses", "shown_profile", "times_along", "turns_at"]
+__all__ = ["CORNER", "PARTS", "SOONEST", "Stands", "shown_pauses", "shown_profile", "times_along", "turns_at"]
 
 STILL, LEAST = 0.05, 1.0
 """Who stays within so many metres of a place for so many seconds stands there."""
@@ -19,6 +19,8 @@ APART = 0.5
 PARTS = 16
 """Parts of a segment, each of which has its speed: a person speeds up within a metre, and a segment
 is about three metres long."""
+SOONEST = 1e-9
+"""Samples that a part of a way takes at least: a walk that leaps over it has a speed all the same."""
 CORNER, OVER = np.radians(45), 0.1
 """A path that turns by more than this, in rad, between so many metres before and behind has a corner:
 on a radius of 0.13 m nobody walks."""
@@ -82,7 +84,7 @@ class Stands:
 
 def _still(walk, period):
     """Spans (first, last) of samples that all belong to some window in which the walk stands."""
-    width = int(np.ceil(LEAST / period - 1e-9)) + 1
+    width = int(min(np.ceil(LEAST / period - 1e-9), len(walk))) + 1
     speed = arc_length(walk)[-1] / (len(walk) * period)
     radius = min(STILL, SLOW * speed * LEAST)
     if width > len(walk):
@@ -202,7 +204,7 @@ def shown_profile(walks, moments, lengths, period):
         when = np.interp(between, way[moved], numbers[moved])
         when[:, 0], when[:, -1] = cuts[:-1], cuts[1:]
         taken += np.diff(when, axis=1) * period / len(walks)
-    return (lengths / PARTS)[:, None] / np.maximum(taken, np.finfo(float).tiny)
+    return (lengths / PARTS)[:, None] / np.maximum(taken, SOONEST * period)
 
 
 def times_along(lines, speeds, pauses):

@@ -157,7 +157,9 @@ def tied_to_corners(way, places, law, environment, objects):
             weights[:, goes] += way.weights[at, frame]
     corners = np.tile(np.arange(4 * len(environment)), (len(points), 1))
     differences = points[:, None] - environment.corners
-    return Association(environment, corners, np.repeat(np.maximum(weights, 0) / 4, 4, axis=1), differences)
+    weights = np.maximum(weights, 0)  # without those that hold it off, the others may be more than all
+    weights = weights / np.maximum(weights.sum(axis=1, keepdims=True), 1)
+    return Association(environment, corners, np.repeat(weights / 4, 4, axis=1), differences)
 
 
 def told_of_places(ways, tolerances, partners):

@@ -4,7 +4,8 @@ from itertools import chain
 
 import numpy as np
 
-from dollop.checks import Note
+from dollop.checks import Note, checked_record, checked_records
+from dollop.environment import Environment
 from dollop.matching import Matching, match_surely
 
 __all__ = ["composed", "inverse", "matched_to", "matchings_into", "notes_of"]
@@ -92,10 +93,11 @@ def matched_to(before, after, matching, names):
     ValueError
         A given matching that belongs to other environments, or none that is sure.
     """
+    for name, each in zip(names, (before, after), strict=True):
+        checked_record(name, each, Environment)
     if matching is None:
         return match_surely(before, after, names)
-    if not isinstance(matching, Matching):
-        raise ValueError(f"a matching must be a Matching, see `match` and `Matching.of_partners`, got {matching!r:.60}")
+    checked_record("a matching, see `match` and `Matching.of_partners`,", matching, Matching)
     n, m, indices = len(before.corners), len(after.corners), matching.indices
     highest = indices.max(initial=-1)
     taken = indices[indices >= 0]
@@ -129,7 +131,7 @@ def matchings_into(environment, demonstrations, given=None):
         Another number of matchings than of demonstrations, one that belongs to others, or none
         left.
     """
-    given = [None] * len(demonstrations) if given is None else list(given)
+    given = [None] * len(demonstrations) if given is None else checked_records("matchings", given, object)
     if len(given) != len(demonstrations):
         raise ValueError(f"matchings must be one for each of {len(demonstrations)} demonstrations, got {len(given)}")
     found, notes, refused = [], [], []

@@ -27,6 +27,8 @@ from itertools import combinations
 
 import numpy as np
 import scipy
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 __all__ = ["Places", "candidates", "tied_places"]
 
@@ -36,6 +38,9 @@ CELL = 0.05
 """m: objects are not known better than to a cell of the foreground grid."""
 BETWEEN, MIXED = (0.25, 0.5, 0.75), 1 / 3
 """Places between two objects that are candidates, and how likely each is beside one object alone."""
+MOST_PAIRS = 500
+"""Pairs of objects between which a place may lie. Candidates are compared with each other, which takes
+time with the square of the pairs: of 32 objects some seconds."""
 STAY, STEP, JUMP = 0.5, 0.25, 0.02
 """Of the chain: what the next place follows is the same, a neighbour between the same two objects, or anything."""
 SIGMA, TAU, LEAST = 0.3, 0.1, 0.03
@@ -84,7 +89,7 @@ class Places:
         return np.einsum("dlf,dlfk->dlk", weights, frames.back(self.local))
 
 
-def candidates(frames, told_apart):
+def candidates(frames, told_apart, shown=None):
     """What a place may follow (a reconstruction).
 
     Parameters
@@ -93,6 +98,9 @@ def candidates(frames, told_apart):
     told_apart : bool
         Whether several demonstrations tell objects, world and places between them apart; else
         single objects only.
+    shown : sequence of D (M, 2) float arrays, optional
+        Places of a way in m. Of more than 500 pairs, those of 32 objects, only so many are taken,
+        which are nearest to it; without a way the first.
 
     Returns
     -------
@@ -104,9 +112,20 @@ def candidates(frames, told_apart):
     if not told_apart:
         return alone[:world] if world else alone
     pairs = [pair for pair in combinations(range(world), 2) if frames.turning[pair[0]] == frames.turning[pair[1]]]
+    if len(pairs) > MOST_PAIRS:
+        away = np.zeros(world) if shown is None else _ways_off(frames, shown)
+        nearest = np.argsort(away[np.array(pairs)].sum(axis=1), kind="stable")[:MOST_PAIRS]
+        pairs = [pairs[k] for k in np.sort(nearest)]
     shares = np.array(BETWEEN)[:, None]
     mixed = [(1 - shares) * alone[a] + shares * alone[b] for a, b in pairs]
     return np.concatenate([alone, *mixed])
+
+
+def _ways_off(frames, shown):
+    """How far (F - 1,) in m objects are from D ways (M, 2), where they are nearest to one."""
+    both = zip(frames.origins[:, :-1], shown, strict=True)
+    away = [cKDTree(walk).query(origins)[0] for origins, walk in both]
+    return np.where(frames.present[:, :-1], away, np.inf).min(axis=0)
 
 
 def tied_places(points, valid, frames, chained=True):
@@ -128,7 +147,7 @@ def tied_places(points, valid, frames, chained=True):
     Places
     """
     apart = told_apart(frames)
-    weights = candidates(frames, apart)
+    weights = candidates(frames, apart, [walk[each] for walk, each in zip(points, valid, strict=True)])
     local, error, counted = seen_from(points, valid, frames)
     logarithms = log_prior(weights, points, valid, local, frames)
     if apart:
@@ -213,10 +232,13 @@ def chain(logarithms, weights):
 
 def steps(weights):
     """(C, C): how probable it is that the next place follows another candidate."""
-    apart = np.abs(weights[:, None] - weights).sum(axis=2) / 2
+    apart = cdist(weights, weights, "cityblock") / 2
     nearest = BETWEEN[0] * 1.01
-    step = np.where(apart < 1e-9, STAY, np.where(apart <= nearest, STEP, 0)) + JUMP / len(weights)
-    return step / step.sum(axis=1, keepdims=True)
+    step = np.where(apart <= nearest, STEP, 0.0)
+    step[apart < 1e-9] = STAY
+    step += JUMP / len(weights)
+    step /= step.sum(axis=1, keepdims=True)
+    return step
 
 
 def refined(followed, error):

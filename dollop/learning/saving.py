@@ -5,15 +5,24 @@ so that nothing can contradict it. Version 1, and a task of the paper's method, 
 ties of its places to corners.
 """
 
-import json
 from dataclasses import asdict
 
 import numpy as np
 
 from dollop.association import Association
-from dollop.checks import Note, check_positive, checked_array
+from dollop.checks import (
+    FARTHEST,
+    Note,
+    check_choice,
+    check_positive,
+    checked_array,
+    checked_flags,
+    checked_positions,
+    checked_wholes,
+    told,
+)
 from dollop.environment import Environment, Seen
-from dollop.formats.files import FormatError, read_bytes
+from dollop.formats.files import check_cells, check_fields, from_file, read_json
 from dollop.lds import LDS, Statistics
 from dollop.learning.paper import anchors
 from dollop.learning.way import Way
@@ -26,6 +35,14 @@ __all__ = ["as_dict", "read_task"]
 FORMAT, VERSION = "dollop task", 2
 SAME = 1e-6
 """m: places that two numbers of a file give must agree to this, or to this share of how far they are from 0."""
+MOST, MAX_SAMPLES, MAX_TEXT = 1000, 20_000, 10_000
+"""Of each list of things, samples of a walk (half an hour of ten a second), and characters of a note."""
+ALWAYS = "format", "version", "demonstrations"
+LAW = "start", "speeds", "segments", "association"
+TASK = *ALWAYS, "method", "environment", "objects", "partners", "notes"
+SHOWN = "walks", "sample_period", "tolerance"
+WAY = (*SHOWN, "shares", "home", "weights", "local", "objects", "turning", "members", "covered")
+"""What there must be in a file, and in its parts."""
 
 
 def as_dict(task):
@@ -125,88 +142,101 @@ def read_task(path, make_task, make_demonstration, laid_out):
     ------
     FormatError
         For a file that is damaged, not a task, of another version, or whose numbers contradict each
-        other.
+        other; and beyond the bounds of `dollop.formats.files.read_json`, 1000 of a list of things and
+        20,000 samples of a walk.
     """
-    try:
-        content = json.loads(read_bytes(path))
-    except (ValueError, RecursionError) as error:
-        raise FormatError(f"not a task: {error}", path) from error
+    return from_file(path, _task_of, read_json(path, "a task"), make_task, make_demonstration, laid_out)
+
+
+def _task_of(content, make_task, make_demonstration, laid_out):
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise FormatError(f"not a task: format must be {FORMAT!r}", path)
+        raise ValueError(f"not a task: format must be {FORMAT!r}")
     version = content.get("version")
     if type(version) is not int or version not in (1, VERSION):
-        raise FormatError(f"version must be 1 or {VERSION}, got {version!r}", path)
+        raise ValueError(f"version must be 1 or {VERSION}, got {told(version)}")
+    if version == 1:
+        content = _as_version_2(content)
+    check_choice("method", content.get("method"), ("anchored", "paper"))
+    check_fields("a task", content, (*TASK, *(["ways"] if content["method"] == "anchored" else LAW)))
+    each_shown = _all("demonstrations", content["demonstrations"], _demonstration_from)
+    shown = tuple(make_demonstration(**each) for each in each_shown)
+    return _task_from(content, shown, make_task, laid_out)
+
+
+def _all(name, content, make, *known):
+    """What is made of each of a list, a tuple; what is refused is named by its number."""
+    if not isinstance(content, list):
+        raise ValueError(f"{name} must be a list, got {told(content)}")
+    if len(content) > MOST:
+        raise ValueError(f"{name} must be at most {MOST}, got {len(content)}")
+    return tuple(_named(f"{name}[{k}]", make, each, *known) for k, each in enumerate(content))
+
+
+def _named(name, make, *content):
+    """What is made of a part; what is refused says of which."""
     try:
-        if version == 1:
-            content = _as_version_2(content)
-        shown = tuple(make_demonstration(**each) for each in map(_demonstration_from, content["demonstrations"]))
-        return _task_from(content, shown, make_task, laid_out)
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
-        raise FormatError(f"a damaged task: {type(error).__name__} {error}", path) from error
+        return make(*content)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def _as_version_2(content):
     """What version 1 holds, by the names of version 2."""
-    shown = [each | {"environment": {"boxes": each["boxes"]}, "notes": []} for each in content["demonstrations"]]
-    told = {
-        "method": "paper",
-        "environment": {"boxes": content["boxes"]},
-        "notes": [],
-        "partners": [],
-        "objects": None,
-    }
-    return content | told | {"demonstrations": shown}
+    check_fields("a task of version 1", content, (*ALWAYS, *LAW, "boxes"))
+    shown = _all("demonstrations", content["demonstrations"], _shown_in_version_1)
+    empty = {"method": "paper", "notes": [], "partners": [], "objects": None}
+    content = content | empty | {"environment": {"boxes": content["boxes"]}, "demonstrations": list(shown)}
+    return {name: value for name, value in content.items() if name != "boxes"}
+
+
+def _shown_in_version_1(content):
+    check_fields("a demonstration of version 1", content, (*SHOWN, "boxes"))
+    kept = {name: content[name] for name in SHOWN}
+    return kept | {"environment": {"boxes": content["boxes"]}, "notes": []}
 
 
 def _task_from(content, shown, make_task, laid_out):
-    environment = _environment_from(content["environment"])
-    notes = tuple(map(_note_from, content["notes"]))
+    environment = _named("environment", _environment_from, content["environment"])
     partners = _partners_from(content["partners"], shown)
     objects = content["objects"]
-    objects = None if objects is None else _numbers("objects", objects, len(environment))
+    if objects is not None:
+        objects = checked_wholes("objects", objects, "N", least=-1, most=len(environment) - 1)
+    notes = _all("notes", content["notes"], _note_from)
     known = {"demonstrations": shown, "notes": notes, "partners": partners, "objects": objects}
-    if content["method"] == "anchored":
-        ways = tuple(_way_from(each, len(shown)) for each in content["ways"])
-        check_positive("the number of ways", len(ways))
-        if max(way.objects.max(initial=-1) for way in ways) >= len(objects):
-            raise ValueError(f"the ways follow more than the {len(objects)} objects that there are")
-        blank = make_task(None, environment, None, learned=ways, **known)
-        return laid_out(blank, environment, objects)
-    if content["method"] != "paper":
-        raise ValueError(f"method must be 'anchored' or 'paper', got {content['method']!r:.40}")
-    law = _law_from(content)
-    return make_task(
-        law,
-        environment,
-        _association_from(content["association"], environment, anchors(law)),
-        **known,
-    )
+    if content["method"] == "paper":
+        law = _law_from(content)
+        tied = _named("association", _association_from, content["association"], environment, anchors(law))
+        return make_task(law, environment, tied, **known)
+    ways = _all("ways", content["ways"], _way_from, len(shown))
+    check_positive("the number of ways", len(ways))
+    count = len(checked_wholes("objects", objects, "N", least=-1))
+    if max(way.objects.max(initial=-1) for way in ways) >= count:
+        raise ValueError(f"the ways follow more than the {count} objects that there are")
+    blank = make_task(None, environment, None, learned=ways, **known)
+    return laid_out(blank, environment, objects)
 
 
 def _law_from(content):
-    segments = content["segments"]
+    segments = _all("segments", content["segments"], _segment_from)
     check_positive("the number of segments", len(segments))
-    start = checked_array("start", content["start"], 2)
-    speeds = checked_array("speeds", content["speeds"], len(segments))
-    check_positive("speeds", speeds.min())
-    return SequencedLDS(tuple(map(_segment_from, segments)), start, speeds)
+    return SequencedLDS(segments, content["start"], content["speeds"])
 
 
 def _segment_from(content):
-    G0, G1 = (checked_array(name, content[name], 2, 2) for name in ("G0", "G1"))
-    return LDS(Statistics(G0, G1), content["goal"])
+    check_fields("a segment", content, ("goal", "G0", "G1"), optional=["A"])  # A: of the first version 1
+    return LDS(
+        Statistics(*(checked_array(name, content[name], 2, 2) for name in ("G0", "G1"))),
+        content["goal"],
+    )
 
 
 def _association_from(content, environment, places):
     """The saved association of places (K, 2) with the corners of an environment, if it puts them there."""
-    corners = _numbers("corners", content["corners"], len(environment.corners), len(places), "m", least=0)
-    weights = checked_array("weights", content["weights"], *corners.shape)
-    differences = checked_array("differences", content["differences"], *corners.shape, 2)
-    check_positive("weights", weights.min(initial=0), or_zero=True)
-    tied = Association(environment, corners, weights, differences)
-    total = weights.sum(axis=1)
-    whole = total > 1 - SAME
-    found = np.einsum("km,kmd->kd", weights, environment.corners[corners] + differences)
+    check_fields("an association", content, ("corners", "weights", "differences"))
+    corners = checked_wholes("corners", content["corners"], len(places), "m")
+    tied = Association(environment, corners, content["weights"], content["differences"])
+    whole = tied.weights.sum(axis=1) > 1 - SAME
+    found = np.einsum("km,kmd->kd", tied.weights, environment.corners[tied.corners] + tied.differences)
     wrong = np.abs(found - places).max(axis=1, initial=0) > SAME * np.maximum(1, np.abs(places).max(axis=1))
     if (wrong & whole).any():
         k = int(np.flatnonzero(wrong & whole)[0])
@@ -216,76 +246,96 @@ def _association_from(content, environment, places):
 
 
 def _way_from(content, count):
-    weights = checked_array("weights", content["weights"], PLACES, "F")
-    frames = weights.shape[1]
-    walks = check_trajectories(content["walks"])
-    shares = [checked_array("shares", share, len(walk)) for share, walk in zip(content["shares"], walks, strict=True)]
-    for share in shares:
-        if (np.diff(share) < 0).any() or share[0] < 0 or share[-1] > PLACES - 1:
-            raise ValueError(f"shares must rise from 0 to {PLACES - 1}, got {share[0]} to {share[-1]}")
-    objects = _numbers("objects", content["objects"], None, frames)
-    turning = _numbers("turning", content["turning"], 2, frames, least=0) == 1
-    if objects[-1] != -1 or turning[-1] or (objects[:-1] < 0).any():
-        raise ValueError("the last frame of a way must be the world, and no other")
-    members = _numbers("members", content["members"], count, "K", least=0)
-    covered = checked_array("covered", content["covered"], len(members), 2)
-    check_positive("sample_period", content["sample_period"])
-    check_positive("tolerance", content["tolerance"])
+    check_fields("a way", content, WAY)
+    weights = checked_array("weights", content["weights"], PLACES, "F", least=-1, most=2)  # smooth ones overshoot
     if np.abs(weights.sum(axis=1) - 1).max() > SAME:
         raise ValueError("the weights of each place must sum to 1")
+    frames, walks = weights.shape[1], _walks_from(content["walks"])
+    objects = checked_wholes("objects", content["objects"], frames, least=-1)
+    turning = checked_flags("turning", content["turning"], frames)
+    if objects[-1] != -1 or turning[-1] or (objects[:-1] < 0).any():
+        raise ValueError("the last frame of a way must be the world, and no other")
+    members = checked_wholes("members", content["members"], "K", most=count - 1)
+    covered = checked_array("covered", content["covered"], len(members), 2, least=-FARTHEST, most=FARTHEST)
+    check_positive("sample_period", content["sample_period"])
+    check_positive("tolerance", content["tolerance"])
+    local = checked_array("local", content["local"], PLACES, frames, 2, least=-2 * FARTHEST, most=2 * FARTHEST)
     return Way(
-        tuple(walks), tuple(shares), checked_array("home", content["home"], PLACES, 2), weights,
-        checked_array("local", content["local"], PLACES, frames, 2), objects, turning, tuple(members.tolist()),
-        tuple(map(tuple, covered.tolist())), content["sample_period"], content["tolerance"],
+        tuple(walks), _shares_from(content["shares"], walks), checked_positions("home", content["home"], PLACES, 2),
+        weights, local, objects, turning, tuple(members.tolist()), tuple(map(tuple, covered.tolist())),
+        content["sample_period"], content["tolerance"],
     )  # fmt: skip
 
 
-def _numbers(name, values, below, *shape, least=-1):
-    """Whole numbers from `least` to below `below`; any length where no shape is given."""
-    found = checked_array(name, values, *(shape or ("N",)))
-    if (found != found.astype(int)).any() or found.min(initial=least) < least:
-        raise ValueError(f"{name} must be whole numbers from {least} on")
-    if below is not None and found.max(initial=-1) >= below:
-        raise ValueError(f"{name} must be below {below}, got {found.max():g}")
-    return found.astype(int)
+def _walks_from(content):
+    """Walks that are as long as somebody shows something."""
+    walks = _all("walks", content, lambda each: checked_positions("a walk", each, "N", 2))
+    longest = max(map(len, walks), default=0)
+    if longest > MAX_SAMPLES:
+        raise ValueError(f"a walk must have at most {MAX_SAMPLES} samples, got {longest}")
+    return check_trajectories(walks)
+
+
+def _shares_from(content, walks):
+    """Where along the places each sample of each walk is."""
+    shares = _all("shares", content, lambda each: checked_array("shares", each, "N", least=0, most=PLACES - 1))
+    if [len(each) for each in shares] != [len(each) for each in walks]:
+        raise ValueError(f"shares must be one for each sample of {len(walks)} walks")
+    for share in shares:
+        if (np.diff(share) < 0).any():
+            raise ValueError(f"shares must rise from 0 to {PLACES - 1}, got a fall by {-np.diff(share).min():g}")
+    return shares
 
 
 def _partners_from(content, shown):
-    if len(content) not in (0, len(shown)):
-        raise ValueError(f"partners must be given for each of {len(shown)} demonstrations, got {len(content)}")
-    pairs = zip(content, shown, strict=False)
-    lengths = [(each, len(one.environment)) for each, one in pairs]
-    return tuple(None if each is None else _numbers("partners", each, None, n) for each, n in lengths)
+    partners = _all("partners", content, _partner_from)
+    if len(partners) not in (0, len(shown)):
+        raise ValueError(f"partners must be given for each of {len(shown)} demonstrations, got {len(partners)}")
+    for each, one in zip(partners, shown, strict=False):
+        if each is not None and len(each) != len(one.environment):
+            raise ValueError(f"partners must be of {len(one.environment)} objects, got {len(each)}")
+    return partners
+
+
+def _partner_from(content):
+    return None if content is None else checked_wholes("partners", content, "N", least=-1)
 
 
 def _demonstration_from(content):
+    check_fields("a demonstration", content, (*SHOWN, "environment", "notes"))
     return {
-        "trajectory": check_trajectories(content["walks"]),
-        "environment": _environment_from(content["environment"]),
+        "trajectory": _walks_from(content["walks"]),
+        "environment": _named("environment", _environment_from, content["environment"]),
         "sample_period": content["sample_period"],
         "tolerance": content["tolerance"],
-        "notes": tuple(map(_note_from, content["notes"])),
+        "notes": _all("notes", content["notes"], _note_from),
     }
 
 
 def _note_from(content):
-    kind, text, doubt = content
-    if not (isinstance(kind, str) and isinstance(text, str) and isinstance(doubt, bool)):
-        raise ValueError(f"a note must be kind, text and doubt, got {content!r:.60}")
-    return Note(kind, text, doubt)
+    kinds = [type(each) for each in content] if isinstance(content, list) else []
+    if kinds != [str, str, bool] or len(content[0]) + len(content[1]) > MAX_TEXT:
+        rule = f"a note must be kind and text, of at most {MAX_TEXT} characters, and doubt"
+        raise ValueError(f"{rule}, got {told(content)}")
+    return Note(*content)
 
 
 def _environment_from(content):
-    directions = content.get("directions")
-    if directions is not None:
+    check_fields("an environment", content, ["boxes"], optional=("directions", "assumed", "seen"))
+    directions, assumed, seen = (content.get(name) for name in ("directions", "assumed", "seen"))
+    if isinstance(directions, list):
         directions = [np.nan if angle is None else angle for angle in directions]
-    assumed, seen = content.get("assumed"), content.get("seen")
-    if seen is not None:
-        floor = np.array([np.frombuffer(row.encode(), np.uint8) == ord("1") for row in seen["floor"]])
-        if floor.ndim != 2:
-            raise ValueError("the rows of what was seen must be of one length")
-        origin = tuple(checked_array("origin", seen["origin"], 2).tolist())
-        check_positive("resolution", seen["resolution"])
-        seen = Seen(floor, origin, seen["resolution"])
-    assumed = None if assumed in (None, []) else np.array(assumed) == 1
-    return Environment(content["boxes"], seen, assumed, directions)
+    seen = None if seen is None else _named("seen", _seen_from, seen)
+    return Environment(content["boxes"], seen, None if assumed == [] else assumed, directions)
+
+
+def _seen_from(content):
+    check_fields("what was seen", content, ("floor", "origin", "resolution"))
+    rows = content["floor"]
+    if not (isinstance(rows, list) and rows and all(isinstance(row, str) and not row.strip("01") for row in rows)):
+        raise ValueError(f"the floor must be rows of 0 and 1, got {told(rows)}")
+    if len(set(map(len, rows))) > 1 or not rows[0]:
+        raise ValueError("the rows of what was seen must be of one length, and not empty")
+    check_cells(len(rows[0]), len(rows))
+    floor = np.frombuffer("".join(rows).encode(), np.uint8).reshape(len(rows), -1) == ord("1")
+    return Seen(floor, content["origin"], content["resolution"])

@@ -15,7 +15,7 @@ from dollop.learning.frames import frames_like
 from dollop.learning.places import Places
 from dollop.learning.ways import PLACES
 from dollop.pose import rotation
-from dollop.sequenced_lds import SequencedLDS
+from dollop.sequenced_lds import SequencedLDS, check_times
 from dollop.trajectory import align, arc_length, resample
 
 __all__ = ["Way", "curve_of", "way_of", "which_places"]
@@ -271,6 +271,7 @@ def _timed(places, pace, period):
     """A walk along places (L, 2) that takes `pace` (L - 1,) in s between them, and its share along them."""
     pace = np.maximum(pace, 1e-3 * period)
     time = np.concatenate([[0.0], pace.cumsum()])
+    check_times(time[-1], period)
     count = max(3, round(time[-1] / period) + 1)
     share = np.interp(np.linspace(0, time[-1], count), time, np.arange(len(places)))
     return scipy.interpolate.CubicSpline(np.arange(len(places)), places)(share), share

@@ -4,7 +4,8 @@ The set-ups are the paper's where it tells them; numbers, seeds and layouts are 
 """
 
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,11 @@ import numpy as np
 from dollop import lab
 from dollop.checks import need
 from dollop.environment import corner_indices
+from dollop.formats.kinds import CARMEN_LOG
 from dollop.formats.logs import write_log
-from dollop.formats.writing import check_writable
-from dollop.gridmap import OccupancyGrid
+from dollop.formats.writing import Output, check_outputs, together
+from dollop.gridmap import OccupancyGrid, map_outputs
+from dollop.lab.recording import outputs as recording_outputs
 from dollop.matching import match
 from dollop.observation import observe
 from dollop.replication.runs import free_poses
@@ -46,6 +49,9 @@ of Sec. II swallows what is nearer. A layout without room for that is drawn anew
 def save_all(folder):
     """Simulate and save every recording that the notebooks read.
 
+    A recording and its truth and scene are written together, and so are the map and the log that it
+    is made from: after a kill each is of the old run or of the new one.
+
     Parameters
     ----------
     folder : str or Path
@@ -59,21 +65,26 @@ def save_all(folder):
     Raises
     ------
     OSError
-        The folder cannot be written to.
+        The folder cannot be written to, or holds something else by one of these names; told before
+        anything is made.
     ImportError
         PyBullet is missing; told before anything is made.
     """
     need("lab")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    check_writable(folder / "lab.yaml")
-    write_log(folder / "empty_lab.log.gz", empty_lab())
-    background_map().save(folder / "lab.yaml")
-    recordings = {"figure_eights": figure_eights().recording, "moved_cones": moved_cones()}
-    recordings |= {f"slalom_{k}": slalom(k).recording for k in (0, 1)}
-    recordings |= {f"moved_cans_{k}": moved_cans(k) for k in range(len(LAYOUTS))}
+    recordings = {"figure_eights": lambda: figure_eights().recording, "moved_cones": moved_cones}
+    recordings |= {f"slalom_{k}": lambda k=k: slalom(k).recording for k in (0, 1)}
+    recordings |= {f"moved_cans_{k}": partial(moved_cans, k) for k in range(len(LAYOUTS))}
+    logs = {name: folder / f"{name}.log.gz" for name in recordings}
+    outputs = [*map_outputs(folder / "lab.yaml"), Output(folder / "empty_lab.log.gz", CARMEN_LOG)]
+    check_outputs([*outputs, *chain.from_iterable(map(recording_outputs, logs.values()))])
+    log, background = empty_lab(), background_map()
+    with together():
+        background.save(folder / "lab.yaml")
+        write_log(folder / "empty_lab.log.gz", log)
     for name, recording in recordings.items():
-        recording.save(folder / f"{name}.log.gz")
+        recording().save(logs[name])
     return ["empty_lab", "lab", *recordings]
 
 

@@ -21,7 +21,7 @@ from math import cos, hypot, inf, sin, sqrt
 import numpy as np
 import scipy
 
-from dollop.gridmap import covered_cells, in_cells, in_metres
+from dollop.gridmap import covered_cells, distances_to, in_cells, in_metres
 
 __all__ = ["FREE_BELOW", "INFLUENCE", "KEPT", "Geodesic", "ObstacleMap", "towards"]
 
@@ -38,6 +38,9 @@ CROWDING = 4.0
 """How many times longer a metre counts for the geodesic where the robot would touch something."""
 OPEN_BORDER = 3.0
 """Border in m of a world without a map round all that is in it."""
+MOST_CELLS, COARSEST = 3_000_000, 0.5
+"""Cells of a map at most, of 300 bytes each where a shortest way is looked for; and their side in m
+at most."""
 AHEAD = 6
 """Cells of a shortest way over which its direction is taken: one alone knows eight directions."""
 
@@ -74,10 +77,15 @@ class ObstacleMap:
     resolution: float
     radius: float = ROBOT_RADIUS
 
+    def __post_init__(self):
+        if min(np.shape(self.distances), default=0) < 2 or np.ndim(self.distances) != 2:
+            shape = np.shape(self.distances)
+            raise ValueError(f"distances must have two rows and columns, got shape {shape}")
+
     @cached_property
     def _lookup(self):
-        """The distances as one list, which answers single questions faster than an array."""
-        return self.distances.ravel().tolist()
+        """The distances one by one, which answers single questions faster than an array."""
+        return memoryview(np.ascontiguousarray(self.distances, float).ravel())
 
     def __repr__(self):
         rows, columns = self.distances.shape
@@ -86,6 +94,11 @@ class ObstacleMap:
     @classmethod
     def of(cls, environment, background=None, places=(), radius=ROBOT_RADIUS, resolution=0.05):
         """The obstacles of an environment before a background (reconstruction).
+
+        A map of more than three million cells, 86 m x 86 m at 5 cm, is made of larger ones: without
+        a background of about so many, with one of squares of its cells. What reaches into a cell
+        fills it, and half a cell more is taken off every distance, so that there is never less room
+        than there seems to be. Along a square of 200 m cells have 12 cm.
 
         Parameters
         ----------
@@ -105,6 +118,11 @@ class ObstacleMap:
         -------
         ObstacleMap
 
+        Raises
+        ------
+        ValueError
+            If cells would have to be larger than 0.5 m: beyond 866 m x 866 m.
+
         Examples
         --------
         A world without anything in it has room everywhere.
@@ -114,14 +132,16 @@ class ObstacleMap:
         True
         """
         if background is None:
-            origin, shape = open_frame(environment.boxes, places, resolution)
+            origin, side, shape = open_frame(environment.boxes, places, resolution)
             blocked = np.zeros(shape, dtype=bool)
         else:
+            blocked, side = coarser(blocked_by(background), background.resolution)
             origin, resolution = background.origin, background.resolution
-            blocked = ~(background.occupancy < FREE_BELOW)
-            blocked[[0, -1]], blocked[:, [0, -1]] = True, True
-        blocked = blocked | covered_cells(environment.boxes, origin, resolution, blocked.shape)
-        return cls(signed_distance(blocked, resolution), origin, resolution, radius)
+        blocked |= covered_cells(environment.boxes, origin, side, blocked.shape)
+        distances = signed_distance(blocked, side)
+        if side > resolution:
+            distances -= side / 2
+        return cls(distances, origin, side, radius)
 
     def edge(self, x, y):
         """Distance between the edge of the robot and the nearest obstacle.
@@ -273,16 +293,16 @@ class ObstacleMap:
 
     @cached_property
     def _nearest_passable(self):
-        """Flat index of the passable cell nearest to each cell, as a list."""
+        """Flat index of the passable cell nearest to each cell, one by one."""
         nearest = {"return_distances": False, "return_indices": True}
         row, column = scipy.ndimage.distance_transform_edt(~self._passable, **nearest)
-        return (row * self.distances.shape[1] + column).ravel().tolist()
+        return memoryview((row * self.distances.shape[1] + column).ravel())
 
     @cached_property
     def _neighbours(self):
         """Sparse (H W, H W) costs in m between passable cells side by side or corner to corner."""
         rows, columns = self.distances.shape
-        index = np.arange(rows * columns).reshape(rows, columns)
+        index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
         room = np.clip((self.distances - self.radius) / INFLUENCE, 0.0, 1.0)
         cost = self.resolution * (1 + CROWDING * (1 - room))
         steps = []
@@ -329,7 +349,7 @@ class Geodesic:
         self.goal = obstacles._centre(self._goal_cell)
         asked = {"directed": False, "indices": self._goal_cell, "return_predecessors": True}
         found = scipy.sparse.csgraph.dijkstra(obstacles._neighbours, **asked)
-        self._distances, self._before = (each.tolist() for each in found)
+        self._distances, self._before = map(memoryview, found)
         self._before[self._goal_cell] = self._goal_cell
 
     def distance(self, x, y):
@@ -401,18 +421,40 @@ def towards(x, y, from_x=0.0, from_y=0.0):
 
 
 def open_frame(boxes, places, resolution):
-    """Lower left corner and shape of a map that holds boxes (N, 4) and places (M, 2) in m."""
+    """Lower left corner, cells' side and shape of a map that holds boxes (N, 4), places (M, 2) in m."""
     points = np.vstack([boxes.reshape(-1, 2), np.reshape(places, (-1, 2))])
     if not len(points):
         points = np.zeros((1, 2))
     low, high = points.min(axis=0) - OPEN_BORDER, points.max(axis=0) + OPEN_BORDER
-    columns, rows = np.ceil((high - low) / resolution).astype(int)
-    return tuple(low.tolist()), (rows, columns)
+    side = max(resolution, float(np.sqrt(np.prod(high - low) / MOST_CELLS)))
+    if not side <= max(COARSEST, resolution):
+        rule = f"{MOST_CELLS} cells of {COARSEST:g} m must hold all places and objects"
+        raise ValueError("without a map {}, got {:.4g} m x {:.4g} m".format(rule, *(high - low)))
+    columns, rows = np.ceil((high - low) / side).astype(int)
+    return tuple(low.tolist()), side, (rows, columns)
+
+
+def blocked_by(background):
+    """Cells (H, W) of a map that are not free, at least (2, 2); its border never is."""
+    blocked = ~(background.occupancy < FREE_BELOW)
+    blocked[[0, -1]], blocked[:, [0, -1]] = True, True
+    lacking = np.maximum(2 - np.array(blocked.shape), 0)
+    return np.pad(blocked, [(0, more) for more in lacking], constant_values=True)
+
+
+def coarser(blocked, side):
+    """Blocked cells (H, W) and their side in m, of larger ones if there are too many."""
+    times = int(np.ceil(np.sqrt(blocked.size / MOST_CELLS)))
+    if times == 1:
+        return blocked, side
+    whole = np.pad(blocked, [(0, -size % times) for size in blocked.shape], constant_values=True)
+    rows, columns = np.array(whole.shape) // times
+    return whole.reshape(rows, times, columns, times).any(axis=(1, 3)), times * side
 
 
 def signed_distance(blocked, resolution):
     """Distances (H, W) in m from cells' centres to the edge of what is blocked, negative inside."""
     if not blocked.any():
         return np.full(blocked.shape, 1e3)
-    outside, inside = map(scipy.ndimage.distance_transform_edt, (~blocked, blocked))
-    return resolution * (outside - inside - np.where(blocked, -0.5, 0.5))
+    distances = distances_to(blocked) - distances_to(~blocked)
+    return resolution * (distances - np.where(blocked, -0.5, 0.5))

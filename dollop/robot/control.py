@@ -25,7 +25,9 @@ from math import atan2, cos, dist, inf, sin
 
 import numpy as np
 
+from dollop.checks import checked_number
 from dollop.law.line import Fading
+from dollop.lds import MOST_STEPS
 from dollop.pose import wrapped
 from dollop.robot.avoidance import Geodesic, towards
 
@@ -52,8 +54,9 @@ pursued one is: 0.35 m."""
 STRAY, JUMP = 0.3, 0.3
 """Distances in m: from its response, at which it is rolled out anew from where the robot is; and in
 one control period, that no robot drives: it has been kidnapped."""
-FARTHEST = 100.0
-"""Length in m after which a response that has not come to its subgoal is given up."""
+FARTHEST, LONGEST = 100.0, 10_000.0
+"""Lengths in m after which a response that has not come to its subgoal is given up: so far, or three
+times as far as it is to the segment's line and along it; and in any case."""
 LEAST_SPEED = 0.1
 """Speed in m/s that a segment is driven at even where the user hardly moved."""
 SHARP = 1.2
@@ -63,6 +66,8 @@ TURN_GAIN = 3.0
 as fast as the robot's turning acceleration allows. On a bend the heading lags by turning rate /
 gain, and that is most of the plain law's distance: over twelve laws 78 mm on average with 2, 45 mm
 with 3."""
+AT_ONCE = 1_000_000
+"""Pairs of places that are compared at once."""
 SLOWEST = 1 / 16
 """Share of the demonstrated speed below which a robot that makes no progress gives up."""
 
@@ -80,7 +85,29 @@ class Limits(namedtuple("Limits", "speed turn acceleration turn_acceleration")):
         In m/s^2, and as much of braking.
     turn_acceleration : float
         In rad/s^2.
+
+    Raises
+    ------
+    ValueError
+        For what is not a positive number, a millionth at least and a million at most.
+
+    Examples
+    --------
+    >>> Limits(0.5, 0.8, 0.5, 0.0)
+    Traceback (most recent call last):
+    ValueError: turn_acceleration must be in 1e-06 to 1e+06, got 0.0
     """
+
+    __slots__ = ()
+
+    def __new__(cls, speed, turn, acceleration, turn_acceleration):
+        values = speed, turn, acceleration, turn_acceleration
+        pairs = zip(cls._fields, values, strict=True)
+        return super().__new__(cls, *(checked_number(name, value, 1e-6, 1e6) for name, value in pairs))
+
+    @classmethod
+    def _make(cls, values):
+        return cls(*values)
 
 
 PIONEER_LIMITS = Limits(0.5, 0.8, 0.5, 1.57)
@@ -247,8 +274,10 @@ class Guidance:
         if self._relative is None:
             return np.ones(len(places))
         line, along = self._lines[k], self._relative[k]
-        squared = ((places[:, None] - line.places) ** 2).sum(axis=2)
-        share = line.way[squared.argmin(axis=1)] / max(line.way[-1], STEP)
+        parts = np.array_split(places, 1 + len(places) * len(line.places) // AT_ONCE)
+        squared = (((part[:, None] - line.places) ** 2).sum(axis=2) for part in parts)
+        nearest = np.concatenate([each.argmin(axis=1) for each in squared])
+        share = line.way[nearest] / max(line.way[-1], STEP)
         return along[np.minimum((share * len(along)).astype(int), len(along) - 1)]
 
     def _leg(self, k, x, y, at=None):
@@ -257,7 +286,7 @@ class Guidance:
         It is beside place `at` of the segment's line; by default beside the nearest.
         """
         places, line = [], Held(self._lines[k], x, y, at)
-        for _ in range(round(FARTHEST / STEP)):
+        for _ in range(round(line.farthest / STEP)):
             if self.reached(k, x, y, STEP):
                 return places, True
             wish = towards(*line.ahead(x, y), x, y)
@@ -313,6 +342,8 @@ class Held:
     def __init__(self, line, x, y, at=None):
         self.line, self.places = line, line.places.tolist()
         self.at, self.last = line.nearest((x, y)) if at is None else at, len(self.places) - 1
+        away = dist(self.places[self.at], (x, y))
+        self.farthest = min(max(FARTHEST, 3 * (away + float(line.way[-1]))), LONGEST)
         self.push(x, y)
 
     def push(self, x, y):
@@ -325,10 +356,14 @@ class Held:
         self.fading = Fading(self.line, here, x - line_x, y - line_y)
 
     def ahead(self, x, y):
-        """The first of the coming states that is 5 cm from x, y in m, or the subgoal if it comes before."""
+        """The first of the coming states that is 5 cm from x, y in m.
+
+        Or the subgoal if it comes before, or is not there after a hundred thousand steps.
+        """
         goal = self.places[-1]
         while dist(self.state, (x, y)) < STEP:
-            if self.at >= self.last and dist(self.state, goal) < STEP:
+            late = self.at > self.last + MOST_STEPS
+            if late or (self.at >= self.last and dist(self.state, goal) < STEP):
                 return goal
             self.at += 1
             line_x, line_y = self.places[min(self.at, self.last)]

@@ -21,9 +21,10 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from dollop.checks import Note, checked_array
+from dollop.checks import Note, checked_array, checked_positions, checked_record, told
 from dollop.formats.carmen_map import OCCUPIED_FROM
-from dollop.gridmap import in_cells
+from dollop.gridmap import OccupancyGrid, in_cells
+from dollop.laser import LaserLog
 from dollop.pose import between, composed, motion_between, poses_at, rotation, wrapped
 from dollop.robot.localization import (
     BEAM_STEP,
@@ -75,6 +76,9 @@ KERNEL = np.array([[-1.0], [0.0], [1.0]]) * np.ones((1, 3))
 """Of a cell and those round it: which lie ahead and which behind."""
 BORDER = 1.0
 """m round the map where beams may end."""
+TILE, HALO = 1024, 2.0
+"""Cells along a side of the parts of a large map that are made ready when a beam ends there, and how
+many m round each count: ten standard deviations of the widest field, so that nothing farther pulls."""
 
 
 def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
@@ -107,8 +111,8 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     Raises
     ------
     ValueError
-        If no place on the map explains the scans, the odometry is of another time than the log, or
-        the map has no free cell.
+        If no place on the map explains the scans, the odometry is of another time than the log, the
+        map has no free cell, or what is given is not of its kind.
 
     Examples
     --------
@@ -121,6 +125,8 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     >>> bool(np.abs(localise(drifting, None, OccupancyGrid.from_log(log)).poses).max() < 0.05)
     True
     """
+    checked_record("log", log, LaserLog)
+    checked_record("background", background, OccupancyGrid)
     by_odometry = _laser_odometry(log, odometry, laser)
     scans, follower = (
         _Scans(log, background),
@@ -140,15 +146,17 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
 
 def _laser_odometry(log, odometry, laser):
     """(T, 3) poses of the laser at the scans, by odometry."""
-    mount = checked_array("laser", laser, 3)
+    mount = checked_positions("laser", laser, 3)
     if odometry is None:
         return log.poses
     t, poses = (getattr(odometry, name, ()) for name in ("t", "poses"))
-    if not len(t):
-        raise ValueError(f"odometry must be an Odometry with a message, or None, got {odometry!r:.60}")
+    if not np.size(t):
+        raise ValueError(f"odometry must be an Odometry with a message, or None, got {told(odometry)}")
+    t = checked_array("the times of the odometry", t, "N")
+    poses = checked_positions("the poses of the odometry", poses, len(t), 3)
     if not ((log.t >= t[0] - 1) & (log.t <= t[-1] + 1)).any():
-        told = f"{t[0]:.10g} to {t[-1]:.10g} s for scans from {log.t[0]:.10g} to {log.t[-1]:.10g} s"
-        raise ValueError(f"odometry must be of the time of the log, got {told}")
+        times = f"{t[0]:.10g} to {t[-1]:.10g} s for scans from {log.t[0]:.10g} to {log.t[-1]:.10g} s"
+        raise ValueError(f"odometry must be of the time of the log, got {times}")
     return composed(poses_at(log.t, t, poses), mount)
 
 
@@ -293,15 +301,15 @@ class _Search:
 
     def _drawn(self, scan):
         """Poses (N, 3) of the lattice that explain a scan best, one of each surroundings."""
-        scores = self._follower.lattice_scores(self._scans.ends[scan][self._scans.back[scan]][::2])
+        ends = self._scans.ends[scan][self._scans.back[scan]]
+        chosen, scores = self._follower.lattice_scores(ends[::2])
         best = np.argpartition(-scores, min(BEST, len(scores)) - 1)[:BEST]
         best = best[np.lexsort([best, -scores[best]])]
-        poses = self._follower.lattice_poses(best)
-        chosen = []
-        while len(poses) and len(chosen) < CANDIDATES:
-            chosen.append(poses[0])
+        poses, candidates = self._follower.lattice_poses(chosen[best]), []
+        while len(poses) and len(candidates) < CANDIDATES:
+            candidates.append(poses[0])
             poses = poses[_differ(poses, poses[0])]
-        return np.array(chosen)
+        return np.array(candidates)
 
     def _tried(self, poses, keys):
         """Poses (N, 3) at the first of some scans that were tried, refined, and how well and closely they fit all."""
@@ -478,32 +486,71 @@ class _Springs:
     """Of each place on the map: half the squared distance to the nearest surface, its slope, and the normal.
 
     The normal is smoothed, as the outer product of the slopes of q with itself, so that there is one on
-    the surface too.
+    the surface too. Of a map that is larger than a tile only those tiles are made in which a beam
+    ends: 24 bytes a cell.
     """
 
     def __init__(self, background):
         self._border = int(np.ceil(BORDER / background.resolution))
-        occupancy = np.pad(np.nan_to_num(background.occupancy), self._border)
-        half = _half_squared_distances(occupancy, background.resolution).astype(np.float32)
-        down, right = np.gradient(half, background.resolution)
-        q_down, q_right = np.gradient(np.exp(-half / SIGMA**2))
-        products = q_right * q_right, q_right * q_down, q_down * q_down
-        xx, xy, yy = (scipy.ndimage.gaussian_filter(product, 1.0) for product in products)
-        size = np.maximum(xx + yy, 1e-12)
-        self._table = np.stack([half, right, down, xx / size, xy / size, yy / size], axis=-1).reshape(-1, 6)
-        self._rows, self._columns = occupancy.shape
-        self._frame = background.origin, background.resolution
+        self._occupancy, self._frame = (
+            background.occupancy,
+            (background.origin, background.resolution),
+        )
+        self._shape = np.add(self._occupancy.shape, 2 * self._border)
+        self._tiles = -(-(self._shape - 1) // TILE)  # each has a row and column of the next
+        self._sides = np.minimum(self._shape, TILE + 1)
+        self._made = np.zeros(np.prod(self._tiles), bool)
+        self._table = np.empty((len(self._made) * np.prod(self._sides), 6), np.float32)
 
     def at(self, points):
         """(...) in m^2, (..., 2) in m and (..., 3) xx, xy, yy at points (..., 2), between the centres of cells."""
         x, y = in_cells(points[..., 0], points[..., 1], *self._frame)
-        x = (x + self._border - 0.5).clip(0, self._columns - 1.001)
-        y = (y + self._border - 0.5).clip(0, self._rows - 1.001)
+        x = (x + self._border - 0.5).clip(0, self._shape[1] - 1.001)
+        y = (y + self._border - 0.5).clip(0, self._shape[0] - 1.001)
         column, row = x.astype(np.intp), y.astype(np.intp)
         right, up = (x - column)[..., None], (y - row)[..., None]
-        corner = row * self._columns + column
+        corner = self._corner(row, column)
         low = self._table[corner] * (1 - right) + self._table[corner + 1] * right
-        corner = corner + self._columns
+        corner = corner + self._sides[1]
         high = self._table[corner] * (1 - right) + self._table[corner + 1] * right
         found = low * (1 - up) + high * up
         return found[..., 0], found[..., 1:3], found[..., 3:]
+
+    def _corner(self, row, column):
+        """Where in the table a cell is, made if it is not there yet."""
+        (down, row), (right, column) = np.divmod(row, TILE), np.divmod(column, TILE)
+        tile = down * self._tiles[1] + right
+        if not self._made.all():
+            for number in np.unique(tile[~self._made[tile]]):
+                self._make(number)
+        return (tile * self._sides[0] + row) * self._sides[1] + column
+
+    def _make(self, number):
+        """Fill in a tile."""
+        begin = np.array(divmod(number, self._tiles[1])) * TILE
+        end = np.minimum(begin + self._sides, self._shape)
+        halo = max(int(np.ceil(HALO / self._frame[1])), 8)
+        low, high = np.maximum(begin - halo, 0), np.minimum(end + halo, self._shape)
+        springs = _springs_of(self._window(low, high), self._frame[1])
+        (top, left), (bottom, right) = begin - low, end - low
+        tile = self._table.reshape(-1, *self._sides, 6)[number]
+        tile[: bottom - top, : right - left] = springs[top:bottom, left:right]
+        self._made[number] = True
+
+    def _window(self, low, high):
+        """Occupancy from one row and column up to others, 0 round the map and where unknown."""
+        low, high = low - self._border, high - self._border
+        first, last = (each.clip(0, self._occupancy.shape) for each in (low, high))
+        inside = np.nan_to_num(self._occupancy[first[0] : last[0], first[1] : last[1]])
+        return np.pad(inside, np.column_stack([first - low, high - last]))
+
+
+def _springs_of(occupancy, resolution):
+    """The springs' numbers (H, W, 6) at the centres of cells (H, W)."""
+    half = _half_squared_distances(occupancy, resolution).astype(np.float32)
+    down, right = np.gradient(half, resolution)
+    q_down, q_right = np.gradient(np.exp(-half / SIGMA**2))
+    products = q_right * q_right, q_right * q_down, q_down * q_down
+    xx, xy, yy = (scipy.ndimage.gaussian_filter(product, 1.0) for product in products)
+    size = np.maximum(xx + yy, 1e-12)
+    return np.stack([half, right, down, xx / size, xy / size, yy / size], axis=-1)

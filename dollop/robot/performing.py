@@ -14,18 +14,41 @@ from math import isfinite
 
 import numpy as np
 
-from dollop.checks import check_choice, check_positive, put_in
+from dollop.checks import (
+    check_choice,
+    check_has,
+    check_positive,
+    checked_array,
+    checked_flag,
+    checked_flags,
+    checked_number,
+    checked_positions,
+    checked_record,
+    checked_records,
+    checked_whole,
+    checked_wholes,
+    put_in,
+    told,
+)
 from dollop.environment import Environment
+from dollop.gridmap import OccupancyGrid
 from dollop.pose import moved_pose
 from dollop.robot.avoidance import ObstacleMap
 from dollop.robot.control import CONTROL_LAWS, PIONEER_LIMITS, Limits, clip
 from dollop.robot.ways import WayKeeper
+from dollop.sequenced_lds import SequencedLDS
 
 __all__ = ["Run", "Unicycle", "perform"]
 
 SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
 """A robot that does not know where it is turns on the spot, in rad/s, and moves off what it
 touches, in m/s: back, and if that has not helped within so many s, forth."""
+MOST_PERIODS = 500_000
+"""Control periods after which any run is given up: fourteen hours, ten times a second."""
+PERIODS = 1e-4, 10.0
+"""s: no motor is told more often what to do, and none is left alone for longer."""
+SOONEST = 1e-6
+"""s: the shortest time-out."""
 HELD = 1.0
 """Time in s for which a robot goes on to move off what it touched."""
 
@@ -61,6 +84,12 @@ class Run:
     way : (N,) int array, optional
         Index of the way in force among the ways of the task; 0, the one most often shown, if not
         given.
+
+    Raises
+    ------
+    ValueError
+        Arrays that are not of one length, or of no period at all; what is no number, flag or text, or
+        is not finite before the last period, in which the robot may have lost its pose.
     """
 
     t: np.ndarray
@@ -76,13 +105,36 @@ class Run:
     way: np.ndarray = None
 
     def __post_init__(self):
-        if self.way is None:
-            put_in(self, way=np.zeros(len(self.t), dtype=int))
+        t = checked_array("t", self.t, "N")
+        if not len(t):
+            raise ValueError("a run must have a period, got none")
+        way = np.zeros(len(t)) if self.way is None else self.way
+        put_in(
+            self,
+            t=t,
+            poses=checked_but_last("poses", self.poses, len(t), 3),
+            true_poses=checked_but_last("true_poses", self.true_poses, len(t), 3),
+            active=checked_wholes("active", self.active, len(t)),
+            localised=checked_flags("localised", self.localised, len(t)),
+            clearance=checked_but_last("clearance", self.clearance, len(t)),
+            finished=checked_flag("finished", self.finished),
+            reason=checked_record("reason", self.reason, str),
+            collisions=checked_whole("collisions", self.collisions),
+            kidnapped=checked_array("kidnapped", self.kidnapped, "M", least=0),
+            way=checked_wholes("way", way, len(t)),
+        )
 
     def __repr__(self):
         end = "finished" if self.finished else self.reason
         touched = f"{self.collisions} collisions, least clearance {self.clearance.min():.2f} m"
         return f"Run of {self.t[-1]:.1f} s{told_ways(self)}: {end}; {touched}"
+
+
+def checked_but_last(name, values, *shape):
+    """Values as a float array; ValueError where they are not finite before the last."""
+    array = checked_array(name, values, *shape, finite=False)
+    checked_array(f"{name} before the last", array[:-1], *array[:-1].shape)
+    return array
 
 
 def told_ways(run):
@@ -103,7 +155,12 @@ class Unicycle:
         x, y in m, theta in rad.
     limits : Limits
     period : float
-        Control period in s.
+        Control period in s, a tenth of a millisecond to ten seconds.
+
+    Raises
+    ------
+    ValueError
+        For a pose that is not finite or beyond 1e9, limits that are none, or another period.
 
     Examples
     --------
@@ -121,7 +178,10 @@ class Unicycle:
         return "Unicycle at ({:.2f}, {:.2f}, {:.2f})".format(*self.pose)
 
     def __init__(self, pose, limits=PIONEER_LIMITS, period=0.1):
-        self.limits, self.period = Limits(*limits), period
+        self.limits, self.period = (
+            Limits(*checked_array("limits", limits, 4)),
+            checked_number("period", period, *PERIODS),
+        )
         self.place(pose)
 
     def place(self, pose):
@@ -131,8 +191,13 @@ class Unicycle:
         ----------
         pose : (3,) sequence of float
             x, y in m, theta in rad.
+
+        Raises
+        ------
+        ValueError
+            For a pose that is not finite, or beyond 1e9.
         """
-        self.pose = tuple(float(value) for value in pose)
+        self.pose = tuple(checked_positions("the pose of a robot", pose, 3).tolist())
         self.speed = self.turn = 0.0
 
     def drive(self, speed, turn):
@@ -144,7 +209,13 @@ class Unicycle:
             In m/s.
         turn : float
             In rad/s, counter-clockwise.
+
+        Raises
+        ------
+        ValueError
+            For what are no numbers.
         """
+        speed, turn = checked_number("speed", speed), checked_number("turn", turn)
         limits, period = self.limits, self.period
         self.speed = approach(self.speed, clip(speed, limits.speed), limits.acceleration * period)
         self.turn = approach(self.turn, clip(turn, limits.turn), limits.turn_acceleration * period)
@@ -189,7 +260,7 @@ def perform(
     kidnap : sequence of (float, (3,) sequence)
         At which times in s the robot is put at which poses.
     timeout : float
-        Give up after this time in s.
+        Give up after this time in s, and in any case after 500,000 control periods.
     localise_within : float
         Give up when the robot has not known where it is for this time in s. Until it knows, it
         turns on the spot, and moves off what it touches.
@@ -203,7 +274,8 @@ def perform(
     ValueError
         For an unknown control law, a start, subgoal or kidnapping that is not finite, off the map
         or in an obstacle (a subgoal: if every way has such a one), a time-out that is not positive,
-        a kidnapping before the start, or no ways, or not as many as `shown` counts.
+        a kidnapping before the start, no ways, or not as many as `shown` counts; for a task or
+        robot that lacks something, and what is not of its kind.
 
     Examples
     --------
@@ -217,9 +289,15 @@ def perform(
     (True, 0, True)
     """
     check_choice("control", control, CONTROL_LAWS)
-    if not (timeout > 0 and localise_within > 0):
-        raise ValueError(f"timeout and localise_within must be positive, got {timeout} and {localise_within}")
-    kidnap = sorted((float(time), tuple(pose)) for time, pose in kidnap)
+    avoid = checked_flag("avoid", avoid)
+    timeout = checked_number("timeout", timeout, SOONEST, np.inf)
+    localise_within = checked_number("localise_within", localise_within, SOONEST, np.inf)
+    if background is not None:
+        checked_record("background", background, OccupancyGrid)
+    kidnap = sorted(checked_kidnappings(kidnap))
+    check_robot(robot, kidnap)
+    check_has("task", task, "law", "environment")
+    checked_record("the task's environment", task.environment, Environment)
     laws, shown = ways_of(task, only=control == "plain" and not avoid)
     places, subgoals = named_places(robot, kidnap), list(map(named_subgoals, laws))
     held = [place[:2] for _, place in [*chain.from_iterable(subgoals), *places]]
@@ -231,11 +309,12 @@ def perform(
     keeper = WayKeeper(laws, shown, robot, control, chart, avoid)
     check_some_way(subgoals, keeper.known)
     check_free(places, keeper.known)
-    records, reason = drive(keeper, robot, list(kidnap), timeout, localise_within)
+    clearance = Clearance()
+    records, reason = drive(keeper, robot, list(kidnap), timeout, localise_within, clearance)
     robot.drive(0.0, 0.0)
     t = np.arange(len(records)) * robot.period
     kidnapped = [time for time, _ in kidnap if time < len(records) * robot.period]
-    return as_run(t, records, reason, kidnapped)
+    return as_run(t, records, clearance.all(), reason, kidnapped)
 
 
 def ways_of(task, only=False):
@@ -246,14 +325,57 @@ def ways_of(task, only=False):
     ValueError
         No ways, or not as many as are counted.
     """
+    checked_record("the task's law", task.law, SequencedLDS)
     if only:
         return (task.law,), (1,)
-    laws = tuple(getattr(task, "ways", (task.law,)))
-    shown = tuple(getattr(task, "shown", (1,) * len(laws)))
+    laws = checked_records("the task's ways", getattr(task, "ways", (task.law,)), SequencedLDS)
+    shown = checked_wholes("shown", getattr(task, "shown", (1,) * len(laws)), "W").tolist()
     if not 0 < len(laws) == len(shown):
-        got = f"got {len(laws)} ways and {shown}"
+        got = f"got {len(laws)} ways and {told(shown)}"
         raise ValueError(f"a task must have a way, and shown must count each, {got}")
-    return laws, shown
+    return laws, tuple(shown)
+
+
+def check_robot(robot, kidnap):
+    """Refuse what cannot perform a task, or be kidnapped if that is wanted; see the module's top.
+
+    Raises
+    ------
+    ValueError
+        With what is missing, or no number or flag.
+    """
+    check_has("robot", robot, "pose", "localised", "limits", "period", "drive")
+    if kidnap:
+        check_has("a robot to be kidnapped", robot, "place")
+    checked_number("the robot's period", robot.period, *PERIODS)
+    checked_flag("whether the robot is localised", robot.localised)
+    check_has("the robot's limits", robot.limits, *Limits._fields)
+    Limits(*(getattr(robot.limits, name) for name in Limits._fields))
+
+
+def checked_kidnappings(kidnap):
+    """Kidnappings as a list of (time in s, pose (3,) as a tuple).
+
+    Raises
+    ------
+    ValueError
+        For what is no pair of a time from the start on and a pose that is finite.
+    """
+    found = []
+    for each in checked_records("kidnap", kidnap, object):
+        pair = checked_records("a kidnapping", each, object)
+        if len(pair) != 2:
+            raise ValueError(f"a kidnapping must be a time and a pose, got {told(each)}")
+        time, pose = pair
+        check_positive("the time of a kidnapping", time, or_zero=True)
+        name = f"the pose of the kidnapping at {time:g} s"
+        found.append(
+            (
+                float(time),
+                tuple(checked_positions(name, pose, 3).tolist()),
+            )
+        )
+    return found
 
 
 class Search:
@@ -274,24 +396,46 @@ class Search:
         return self.speed, 0.0
 
 
-def drive(keeper, robot, kidnap, timeout, localise_within):
+class Clearance:
+    """Distances in m from the robot's edge, each on the map of its period, which is not kept."""
+
+    def __init__(self):
+        self.known, self.places, self.told = None, [], []
+
+    def add(self, x, y, known):
+        """One more place in m, on a map."""
+        if known is not self.known and self.places:
+            self.all()
+        self.known = known
+        self.places.append((x, y))
+
+    def all(self):
+        """(N,) float array: of all places so far."""
+        if self.places:
+            self.told.append(self.known.edges(self.places))
+            self.places = []
+        return np.concatenate(self.told)
+
+
+def drive(keeper, robot, kidnap, timeout, localise_within, clearance):
     """The control loop: what was the case in each period, and why it gave up, or nothing.
 
-    A record is (pose, true pose, segment, way, localised, touching, map).
+    A record is (pose, true pose, segment, way, localised, touching).
     """
     records, blind, search = [], 0.0, Search(robot.period)
     while True:
         now = len(records) * robot.period
         if kidnap and now > kidnap[0][0] - robot.period / 2:
             robot.place(kidnap.pop(0)[1])
-        x, y, theta = pose = robot.pose
+        x, y, theta = pose = tuple(map(float, robot.pose))
         touching = getattr(robot, "touching", None)
         true_pose = getattr(robot, "true_pose", pose)
         finite = isfinite(x + y + theta)
         if robot.localised and finite:
             keeper.begin(x, y)
-        state = keeper.active, keeper.way, robot.localised, touching, keeper.known
+        state = keeper.active, keeper.way, robot.localised, touching
         records.append((pose, true_pose, *state))
+        clearance.add(*true_pose[:2], keeper.known)
         if not finite:
             return records, f"the pose must be finite, got {x, y, theta} at {now:.1f} s"
         if robot.localised:
@@ -306,39 +450,24 @@ def drive(keeper, robot, kidnap, timeout, localise_within):
             return records, f"the robot has not known where it is for {localise_within:g} s"
         if now >= timeout:
             return records, f"not finished within {timeout:g} s"
+        if len(records) > MOST_PERIODS:
+            return records, f"not finished within {MOST_PERIODS} periods of {robot.period:g} s"
         robot.drive(*command)
 
 
-def as_run(t, records, reason, kidnapped):
-    """The records of the control loop at times (N,) in s as a Run."""
-    *columns, maps = zip(*records, strict=True)
-    *poses, active, way, localised, touching = map(np.array, columns)
+def as_run(t, records, clearance, reason, kidnapped):
+    """The records of the control loop at times (N,) in s, with clearances (N,) in m, as a Run."""
+    *poses, active, way, localised, touching = map(np.array, zip(*records, strict=True))
     poses, true_poses = (each.astype(float) for each in poses)
-    clearance = clearances(true_poses[:, :2], maps)
     contact = clearance < 0 if touching[0] is None else touching.astype(bool)
     collisions = int(np.count_nonzero(np.diff(contact, prepend=False) & contact))
-    told = t, poses, true_poses, active, localised, clearance
-    return Run(*told, not reason, reason, collisions, np.array(kidnapped, dtype=float), way)
-
-
-def clearances(places, maps):
-    """Distances (N,) in m from the robot's edge at places (N, 2), each on the map of its period."""
-    clearance, of_map = np.empty(len(places)), {id(each): each for each in maps}
-    used = np.array(list(map(id, maps)))
-    for name, obstacles in of_map.items():
-        clearance[used == name] = obstacles.edges(places[used == name])
-    return clearance
+    columns = t, poses, true_poses, active, localised, clearance
+    return Run(*columns, not reason, reason, collisions, np.array(kidnapped, dtype=float), way)
 
 
 def named_subgoals(law):
-    """The subgoals of a law, each with its name.
-
-    Raises
-    ------
-    ValueError
-        One that is not finite.
-    """
-    return checked_finite([(f"subgoal {k}", place) for k, place in enumerate(law.subgoals)])
+    """The subgoals of a law, each with its name."""
+    return [(f"subgoal {k}", place) for k, place in enumerate(law.subgoals)]
 
 
 def named_places(robot, kidnap):
@@ -347,20 +476,12 @@ def named_places(robot, kidnap):
     Raises
     ------
     ValueError
-        One that is not finite, or a kidnapping before the start.
+        One that is not finite.
     """
     places = [("the start", robot.pose)] if robot.localised else []
-    for time, pose in kidnap:
-        check_positive("the time of a kidnapping", time, or_zero=True)
-        places.append((f"the pose of the kidnapping at {time:g} s", pose))
-    return checked_finite(places)
-
-
-def checked_finite(places):
-    """Named places, if all are finite."""
+    places += [(f"the pose of the kidnapping at {time:g} s", pose) for time, pose in kidnap]
     for name, place in places:
-        if not np.isfinite(place).all():
-            raise ValueError(f"{name} must be finite, got {place}")
+        checked_positions(name, place, 3)
     return places
 
 

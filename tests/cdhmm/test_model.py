@@ -288,7 +288,7 @@ def test_bad_demonstrations_are_named(sequences, message):
 @pytest.mark.parametrize("spread", [0, -0.1, np.nan, np.inf])
 def test_a_spread_must_be_positive(spread):
     """A spread of zero or less, or none at all, is refused."""
-    with pytest.raises(ValueError, match=f"spread must lie between 1e-06 and .* m, got {spread}"):
+    with pytest.raises(ValueError, match=f"spread must be .*, got {spread}"):
         SubgoalHMM.fit([SLALOM], spread)
 
 
@@ -312,8 +312,8 @@ def test_of_equally_probable_ways_the_one_shown_first_is_taken():
 @pytest.mark.parametrize(
     ("sequence", "spread", "says"),
     [
-        ([(0, 0), (1, 0)], 1e-100, "spread must lie between 1e-06 and 1e.06 m, got 1e-100"),
-        ([(0, 0), (1, 0)], 1e300, "spread must lie between"),
+        ([(0, 0), (1, 0)], 1e-100, "spread must be in 1e-06 to 1e.06, got 1e-100"),
+        ([(0, 0), (1, 0)], 1e300, "spread must be "),
         ([(0, 0), (1e154, 0)], 0.15, "must lie within 1e.09 m of the origin, got 1e.154 m"),
     ],
 )

@@ -246,8 +246,8 @@ BAD_LINES = {
     "4 fields in the line, expected 13 or 14": "FLASER 3 1.0 2.0",
     "must be at least 1, got 0": "FLASER",
     "could not convert string to float: b.host": GOOD_LINE.replace("1.0 ", "", 1),
-    "must be finite, got nan": GOOD_LINE.replace("2.0", "nan", 1),
-    "must be finite, got inf": GOOD_LINE.replace("2.0", "inf", 1),
+    "must be finite, .*, got nan": GOOD_LINE.replace("2.0", "nan", 1),
+    "must be finite, .*, got inf": GOOD_LINE.replace("2.0", "inf", 1),
     "a range must be finite and not negative, got -2.0": GOOD_LINE.replace("2.0", "-2.0", 1),
     "could not convert string to float: b'two'": GOOD_LINE.replace("2.0", "two", 1),
     "invalid literal for int.. with base 10: b'3.5'": GOOD_LINE.replace("FLASER 3", "FLASER 3.5"),
@@ -364,6 +364,7 @@ def test_damaged_files_never_fail_in_the_depth(tmp_path, kind, edits, zipped):
     """
     path = tmp_path / "a.log"
     if kind == "robotlaser":
+        path.unlink(missing_ok=True)  # damaged by the example before, it would not be replaced
         carmen_log.write_log(path, random_log(scans=25, beams=3))
     else:
         write(path, [*flasers(25), *(f"ODOM {i} 0 0 0 0 0 {i} host {i}" for i in range(25))])

@@ -54,8 +54,11 @@ DAMAGED_TRUTHS = {
         "t,x,y,heading\n0.0,1.0,2.0,0.0\n",
         "rows 2, one for each scan, .* got .* heading and 1",
     ),
-    "no number": ("t,x,y,heading\n0.0,1.0,2.0,0.0\n0.1,one,2.0,0.0\n", "not a table of numbers"),
-    "empty": ("", "not a table of numbers"),
+    "no number": (
+        "t,x,y,heading\n0.0,1.0,2.0,0.0\n0.1,one,2.0,0.0\n",
+        "not a table of numbers: x must be a number, got 'one'",
+    ),
+    "empty": ("", "the file is empty"),
     "no time": ("x,y,heading\n1.0,2.0,0.0\n1.0,2.0,0.0\n", "columns must be t and of"),
     "a column more": (
         "t,x,y,heading,age\n0,1,2,0,30\n0,1,2,0,30\n",
@@ -69,7 +72,7 @@ def test_a_damaged_truth_is_named(tmp_path, text, rule):
     """A truth of wrong length or content raises FormatError that names file and rule."""
     small_recording().save(tmp_path / "eights.log")
     (tmp_path / "eights_truth.csv").write_text(text)
-    with pytest.raises(FormatError, match=f"eights_truth.csv: .*{rule}"):
+    with pytest.raises(FormatError, match=f"eights_truth.csv.*: .*{rule}"):
         Recording.load(tmp_path / "eights.log")
 
 
@@ -90,12 +93,15 @@ DAMAGED_SCENES = {
         "fov/resolution must be one of .*180/0.25",
     ),
     "another rate": (lambda scene: with_scanner(scene, rate=75.0), "rate of a SICK LMS 200 must be 10 .*, got 75"),
-    "NaN": (lambda scene: scene | {"robot": scene["robot"] | {"speed": float("nan")}}, "speed must be .*, got nan"),
+    "NaN": (
+        lambda scene: scene | {"robot": scene["robot"] | {"speed": float("nan")}},
+        "not a scene: a number must be finite, .*, got NaN",
+    ),
     "no room": (lambda scene: scene | {"objects": 2 * scene["objects"]}, "objects must not stand in each other"),
     "a list": (lambda scene: [scene], "not a scene"),
     "too large": (
         lambda scene: scene | {"room": scene["room"] | {"height": 10**400}},
-        r"the room: the height of a room must be a finite number within 1e\+09, got 1000000",
+        "not a scene: a number must be finite, .*, got 1000000",
     ),
     "text": (
         lambda scene: scene | {"robot": scene["robot"] | {"radius": "0.25"}},
@@ -123,5 +129,5 @@ def test_what_is_no_json_is_named(tmp_path, text):
     """Anything else than JSON in the scene's place raises FormatError that names the file."""
     small_recording().save(tmp_path / "eights.log")
     (tmp_path / "eights_scene.json").write_text(text)
-    with pytest.raises(FormatError, match="eights_scene.json: not a scene"):
+    with pytest.raises(FormatError, match="eights_scene.json: (not a scene|the file is empty)"):
         Recording.load(tmp_path / "eights.log")

@@ -339,9 +339,9 @@ BAD_TOURS = [
     ({"places": [(3.0, 3.0), (8.8, 5.95)]}, "must be in the room and free"),
     ({"places": []}, "places must have shape|must be in the room and free"),
     ({"places": [(3.0, np.nan)]}, r"places must be finite, got \[3.0, nan\] in row 0"),
-    ({"stride": 0.0}, "stride must be in 0.01 to inf, got 0.0"),
+    ({"stride": 0.0}, "stride must be in 0.01 to 1e.09, got 0.0"),
     ({"stride": "1"}, "stride must be a finite number, got '1'"),
-    ({"turns": 0}, "turns must be in 1 to inf, got 0"),
+    ({"turns": 0}, "turns must be in 1 to 1e.09, got 0"),
 ]
 
 

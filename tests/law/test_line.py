@@ -170,5 +170,5 @@ def test_what_is_no_method_or_segment_is_refused(one_lap):
     law = SequencedLDS.fit(one_lap)
     with pytest.raises(ValueError, match="method must be .*got 'held on'"):
         law.response(method="held on")
-    with pytest.raises(ValueError, match="segment must be 0 to 5, got 6"):
+    with pytest.raises(ValueError, match="segment must be a whole number, 0 to 5, got 6"):
         law.response(segment=6)

@@ -149,12 +149,17 @@ def test_numbers_that_contradict_each_other_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda way: way["weights"][0].__setitem__(0, 7.0), "must sum to 1"),
-        (lambda way: way.update(members=[0, 9]), "members must be below 2"),
+        (lambda way: way["weights"][0].__setitem__(0, 0.7), "must sum to 1"),
+        (lambda way: way["weights"][0].__setitem__(0, 1e308), r"ways\[0\]: weights must be in -1 to 2"),
+        (lambda way: way.update(members=[0, 9]), "members must be in 0 to 1, got"),
         (lambda way: way.update(objects=way["objects"][:-1] + [0]), "must be the world"),
         (lambda way: way["shares"][0].__setitem__(3, 78.0), "shares must rise"),
         (lambda way: way.update(tolerance=-1), "tolerance must be positive"),
         (lambda way: way["home"].pop(), "home must have shape"),
+        (lambda way: way.pop("home"), r"ways\[0\]: a way lacks home$"),
+        (lambda way: way.update(shares=3), "shares must be a list, got 3"),
+        (lambda way: way["shares"][0].pop(), "shares must be one for each sample of"),
+        (lambda way: way.update(turning=2), "turning must have shape"),
     ],
 )
 def test_a_damaged_way_is_a_format_error(tmp_path, change, message):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dollop.environment import Environment
+from dollop.learning import places
 from dollop.learning.frames import frames_like, frames_of
 from dollop.learning.places import candidates, chain, steps, tied_places
 
@@ -103,3 +104,19 @@ def test_what_is_gone_leaves_its_weight_to_the_others():
     frames = frames_at(centres)
     alone = frames_like(frames.objects, frames.turning, environment(centres[0, :1]), np.array([0]))
     np.testing.assert_allclose(places.among(alone)[0], 0, atol=1e-9)
+
+
+def test_of_many_objects_only_pairs_near_the_way_are_candidates(monkeypatch):
+    """What lies far from all that was shown is left out, and nothing else; every object alone remains."""
+    low = np.array([[0.0, 1.0], [40.0, 40.0], [2.0, 1.0], [4.0, 1.0], [-50.0, 3.0]])
+    environments = [Environment(np.hstack([low + shift, low + shift + 0.4])) for shift in (0.0, 0.3)]
+    corners = environments[0].corners.reshape(-1, 4, 2) - environments[0].centres[:, None]
+    frames = frames_of(environments, [np.arange(5)] * 2, corners)
+    ways = [np.linspace([0.0, 0.0], [4.0, 0.0], 20)] * 2
+    every = candidates(frames, True, ways)
+    alone = len(frames)
+    monkeypatch.setattr(places, "MOST_PAIRS", 3)
+    few = candidates(frames, True, ways)
+    assert len(every) == alone + 3 * 10 and len(few) == alone + 3 * 3
+    assert np.array_equal(few[:alone], every[:alone])
+    assert set(np.flatnonzero(few[alone:].any(axis=0))) == {0, 2, 3}

@@ -276,6 +276,37 @@ def test_an_interrupt_ends_with_one_line(tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "metrics.json").exists()
 
 
+def test_a_panel_that_is_done_has_its_numbers(tmp_path, monkeypatch, capsys):
+    """Interrupted at the second panel: picture, numbers and page of the first are there, and said to be."""
+    pytest.importorskip("pybullet")
+    make = figures.make
+
+    def interrupted_at_9(id, folder):
+        made = make(id, folder)
+        if id == "9":
+            raise KeyboardInterrupt
+        return made
+
+    monkeypatch.setattr(figures, "make", interrupted_at_9)
+    with pytest.raises(SystemExit):
+        door.main(["8", "9", "--folder", str(tmp_path)])
+    assert "1 of 2 panels are done, with their numbers" in capsys.readouterr().err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["README.md", "fig_08.png", "metrics.json"]
+    assert json.loads((tmp_path / "metrics.json").read_text()).keys() == {"8"}
+    assert "fig_08.png" in (tmp_path / "README.md").read_text()
+
+
+@pytest.mark.parametrize(("name", "text"), [("README.md", "My own page."), ("metrics.json", '{"a": 1}')])
+def test_a_folder_with_other_things_is_left_alone(name, text, tmp_path, monkeypatch, capsys):
+    """A README of somebody else, or other numbers: told before the work."""
+    monkeypatch.setattr(figures, "make", None)
+    (tmp_path / name).write_text(text)
+    with pytest.raises(SystemExit):
+        door.main(["8", "--folder", str(tmp_path)])
+    assert f"{name} cannot be written: it holds something else" in capsys.readouterr().err
+    assert (tmp_path / name).read_text() == text
+
+
 def test_numbers_that_are_none_are_refused_before_the_work(tmp_path, monkeypatch):
     """A metrics.json that is not JSON ends the call before a panel is drawn."""
     monkeypatch.setattr(figures, "make", None)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
+from dollop.robot import avoidance
 from dollop.robot.avoidance import INFLUENCE, KEPT, Geodesic, ObstacleMap
 
 BOX = ObstacleMap.of(Environment([[-0.5, -0.5, 0.5, 0.5]]))
@@ -185,3 +186,48 @@ def test_geodesic_to_a_place_too_near_to_something():
     way = Geodesic(BOX, (0.6, 0.0))
     assert BOX.edge(*way.goal) > 0
     assert np.hypot(way.goal[0] - 0.6, way.goal[1]) < 0.35
+
+
+@pytest.mark.parametrize("cells", [4_000, 40_000])
+def test_larger_cells_never_promise_more_room(cells, monkeypatch):
+    """Of a world for which there are too few cells of 5 cm, every distance is true or less, by two cells at most."""
+    monkeypatch.setattr(avoidance, "MOST_CELLS", cells)
+    rng = np.random.default_rng(0)
+    low = rng.uniform(-9, 9, (12, 2))
+    boxes = np.hstack([low, low + rng.uniform(0.1, 2.0, (12, 2))])
+    coarse = ObstacleMap.of(Environment(boxes), places=[[-12, -12], [12, 12]])
+    assert coarse.resolution > 0.1 and coarse.distances.size < 1.05 * cells
+    points = rng.uniform(-12, 12, (5000, 2))
+    outside = np.maximum(boxes[:, None, :2] - points, points - boxes[:, None, 2:])
+    true = np.where((outside < 0).all(axis=2), outside.max(axis=2), np.hypot(*outside.clip(0).T).T).min(axis=0)
+    told = coarse.edges(points) + coarse.radius
+    assert (told[true > 0] <= true[true > 0]).all() and (told[true < 0] <= 0).all()
+    assert (told >= true - 2.5 * coarse.resolution)[true > 0].all()
+
+
+def test_larger_cells_of_a_map_keep_what_is_not_free(monkeypatch):
+    """Of a map of too many cells too: one cell that is occupied or unknown blocks a whole square of them."""
+    rng = np.random.default_rng(1)
+    occupancy = np.where(rng.random((201, 302)) < 0.002, rng.choice([1.0, np.nan], (201, 302)), 0.0)
+    grid, nothing = OccupancyGrid(occupancy, (1.0, -2.0), 0.05), Environment(np.empty((0, 4)))
+    fine = ObstacleMap.of(nothing, grid)
+    monkeypatch.setattr(avoidance, "MOST_CELLS", 15_000)
+    coarse = ObstacleMap.of(nothing, grid)
+    assert coarse.resolution == pytest.approx(0.15) and coarse.distances.shape == (67, 101)
+    points = rng.uniform([1.1, -1.9], [16.0, 8.0], (3000, 2))
+    assert (coarse.edges(points) <= fine.edges(points) + 1e-9).all()
+
+
+def test_a_world_that_is_too_large_is_refused():
+    """Cells would be coarser than a robot: the message says how large a world may be."""
+    with pytest.raises(ValueError, match=r"3000000 cells of 0.5 m must hold all places and objects, got 1006 m x"):
+        ObstacleMap.of(Environment([]), places=[[0, 0], [1000, 1000]])
+    with pytest.raises(ValueError, match="got 1e"):
+        ObstacleMap.of(Environment([[1e9, 0, 1e9 + 1, 1]]), places=[[0, 0]])
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (5, 1), (2, 2)])
+def test_a_map_of_one_row_has_no_room(shape):
+    """Its border is all of it."""
+    grid = OccupancyGrid(np.zeros(shape), (0.0, 0.0), 0.05)
+    assert ObstacleMap.of(Environment([]), grid).edge(0.02, 0.02) <= -0.25

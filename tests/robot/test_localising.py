@@ -15,6 +15,7 @@ from dollop.formats import Odometry, read_log, read_odometry
 from dollop.gridmap import OccupancyGrid
 from dollop.laser import LaserLog
 from dollop.pose import between, composed
+from dollop.robot import localising
 from dollop.robot.localising import (
     CUT,
     KEYS,
@@ -86,6 +87,27 @@ def test_drifting_poses_are_put_right(background, boxes):
     found = localise(log, None, background)
     assert_found(found, TRUTH)
     assert np.array_equal(found.ranges, log.ranges) and np.array_equal(found.t, log.t)
+
+
+def test_a_large_map_is_localised_on_tile_by_tile(background, monkeypatch):
+    """Made of tiles, of which a beam may end in any, the springs are the same wherever anything pulls."""
+    log = recorded(TRUTH, composed(FRAME, DRIFTING))
+    points = np.random.default_rng(0).uniform(-3, 12, (300, 40, 2))
+    whole, (half, *pulls) = localise(log, None, background), _Springs(background).at(points)
+    monkeypatch.setattr(localising, "TILE", 50)
+    tiled = _Springs(background)
+    assert len(tiled._made) == 20
+    for one, other in zip((half, *pulls), tiled.at(points), strict=True):
+        assert np.array_equal(one[half < 1.9], other[half < 1.9])
+    assert np.abs(localise(log, None, background).poses - whole.poses).max() < 1e-6
+
+
+def test_tiles_are_made_when_a_beam_ends_there(background, monkeypatch):
+    """A robot in one corner of a hall needs but that."""
+    monkeypatch.setattr(localising, "TILE", 50)
+    springs = _Springs(background)
+    springs.at(np.array([[0.2, 0.2], [0.3, 0.1]]))
+    assert springs._made.sum() == 1
 
 
 def test_odometry_of_a_frame_of_its_own(background):

@@ -1,5 +1,7 @@
 """Monte Carlo localisation: it follows, notices a kidnapping, and believes nothing too early."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from rooms import ANGLES, CANS, FURNITURE, WALLS, drawn_map, room_map, scan
@@ -7,9 +9,11 @@ from rooms import ANGLES, CANS, FURNITURE, WALLS, drawn_map, room_map, scan
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.pose import motion_between
+from dollop.robot import localization
 from dollop.robot.localization import (
     BELIEVED_AFTER,
     FLOOR,
+    HEADINGS,
     SEARCHING,
     SIGMA,
     TRACKING,
@@ -201,7 +205,49 @@ def test_lattice_agrees_with_particles(background):
     places = np.random.default_rng(0).uniform([1, 1], [8, 6], (200, 2))
     ends = np.random.default_rng(1).uniform(-3, 3, (30, 2))
     exact = field.log_likelihoods(np.column_stack([places, np.full(200, 0.7)]), ends)
-    assert np.corrcoef(exact, field.lattice_log_likelihoods(places, 0.7, ends))[0, 1] > 0.98
+    (scores,) = field.lattice_log_likelihoods(places, [0.7], ends)
+    assert np.corrcoef(exact, scores)[0, 1] > 0.98
+
+
+def test_the_lattice_counts_beams_that_end_beyond_the_map(background):
+    """Moved by whole cells, a beam that leaves the map, however far, counts the floor, from any place."""
+    grid = background.origin, background.resolution
+    field = LikelihoodField(background.distance_field(), 0.2, *grid)
+    places = np.random.default_rng(0).uniform([0, 0], [9, 7], (50, 2))
+    for ends in ([[12.0, 0.0], [0.0, -50.0]], [[1e6, 0.0]], [[0.0, -9.5]]):
+        (scores,) = field.lattice_log_likelihoods(places, [0.0], np.array(ends))
+        assert scores == pytest.approx(np.full(50, len(ends) * np.log(FLOOR)))
+
+
+def test_of_many_poses_the_best_are_kept(background, monkeypatch):
+    """They are the same as the best of all, in the same order."""
+    localizer = MonteCarloLocalizer(background, ANGLES)
+    ends = localizer._beam_ends(scan(START, ROOM))[::6]
+    every, scores = localizer.lattice_scores(ends)
+    assert np.array_equal(every, np.arange(len(localizer._lattice) * HEADINGS))
+    monkeypatch.setattr(localization, "MOST_POSES", 1000)
+    chosen, kept = localizer.lattice_scores(ends)
+    assert len(chosen) == 1000 and np.array_equal(kept, scores[chosen])
+    assert kept.min() >= np.sort(scores)[-1000] and (np.diff(chosen) > 0).all()
+
+
+def test_a_localizer_takes_some_bytes_a_cell():
+    """40 a cell to begin, 16 to follow and 70 to search, where beams are short: of 16 million less than 1 GiB.
+
+    However long a beam is, the border where it may end is no wider than the map.
+    """
+    rng = np.random.default_rng(0)
+    background = OccupancyGrid((rng.random((700, 900)) < 0.5).astype(float), (0.0, 0.0), 0.05)
+    cells = background.occupancy.size
+    tracemalloc.start()
+    localizer = MonteCarloLocalizer(background, ANGLES, pose=[1.0, 1.0, 0.0])
+    now, most = tracemalloc.get_traced_memory()
+    assert now < 16 * cells and most < 40 * cells
+    for reach, allowed in ((3.0, 70), (1e6, 140)):
+        tracemalloc.reset_peak()
+        localizer.lattice_scores(np.array([[reach, 0.0]]))
+        assert tracemalloc.get_traced_memory()[1] < allowed * cells + 100 * localization.MOST_POSES
+    tracemalloc.stop()
 
 
 def test_the_lattice_holds_free_places_fifteen_centimetres_apart(background):

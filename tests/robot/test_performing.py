@@ -1,6 +1,8 @@
 """Performing: the robots' limits, runs that finish or say why not, kidnappings, and bad input."""
 
+import weakref
 from inspect import ismodule
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,9 +10,10 @@ import pytest
 from places import DATA
 from rooms import CANS, figure_eight_task, free_poses, room_map
 
-from dollop import robot
+from dollop import Demonstration, Task, robot
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
+from dollop.robot import avoidance, performing
 from dollop.robot.avoidance import INFLUENCE, ObstacleMap
 from dollop.robot.control import PIONEER_LIMITS, Limits
 from dollop.robot.performing import Search, Unicycle, perform
@@ -338,14 +341,14 @@ def test_a_lost_robot_tries_the_other_way():
     ("change", "message"),
     [
         ({"control": "fancy"}, "control must be one of .*'fancy'"),
-        ({"timeout": 0.0}, "timeout and localise_within must be positive, got 0.0"),
+        ({"timeout": 0.0}, "timeout must be in 1e-06 to inf, got 0.0"),
         ({"kidnap": [(3.0, (3.0, 6.6, 0.0))]}, "kidnapping at 3 s must be free"),
         ({"kidnap": [(3.0, (np.nan, 2.0, 0.0))]}, "kidnapping at 3 s must be finite"),
         ({"kidnap": [(3.0, (20.0, 2.0, 0.0))]}, "kidnapping at 3 s must lie in the lab"),
         ({"kidnap": [(np.nan, (3.0, 2.0, 0.0))]}, "kidnapping must be finite and not .*, got nan"),
         ({"kidnap": [(-1.0, (3.0, 2.0, 0.0))]}, "kidnapping must be .* not negative, got -1"),
         ({"robot": Unicycle((7.5, 0.3, 0.0))}, "the start must be free"),
-        ({"robot": Unicycle((4.0, np.nan, 0.0))}, "the start must be finite"),
+        ({"robot": Own((4.0, np.nan, 0.0))}, "the start must be finite"),
         ({"robot": Unicycle((4.0, -5.0, 0.0))}, "the start must lie in the lab"),
     ],
 )
@@ -392,3 +395,44 @@ def test_the_way_out_of_a_niche_is_found(task, control, place):
     lab = OccupancyGrid.load(DATA / "lab.yaml")
     run = perform(task, Unicycle(START), control, background=lab, kidnap=[(28.0, place)])
     assert run.finished and not run.collisions
+
+
+def test_a_robot_whose_time_hardly_passes_is_given_up(task, monkeypatch):
+    """Whatever the time-out, there is a last control period."""
+    monkeypatch.setattr(performing, "MOST_PERIODS", 50)
+    robot = Stuck(START)
+    robot.period = 1e-4
+    run = perform(task, robot, timeout=np.inf)
+    assert run.reason == "not finished within 50 periods of 0.0001 s" and len(run.t) == 51
+
+
+def test_half_a_kilometre_without_a_map(monkeypatch):
+    """Legs of 125 m each, an object on the first: larger cells, and nothing is touched."""
+    monkeypatch.setattr(avoidance, "MOST_CELLS", 300_000)
+    corners = np.array([[0, 0], [125, 0], [125, 125], [0, 125], [0, 3.0]])
+    walk = np.vstack([np.linspace(a, b, 1250, endpoint=False) for a, b in pairwise(corners)])
+    task = Task.of(Demonstration(walk, Environment([[60.0, -0.4, 60.5, 0.2], [122.0, 60.0, 122.5, 60.5]])))
+    run = perform(task, Unicycle((0.0, 0.0, 0.3)), timeout=1500)
+    assert run.finished and run.collisions == 0 and run.clearance.min() > 0
+    away = np.maximum(np.abs(run.poses[:, :2] - [60.25, -0.1]) - [0.25, 0.3], 0)
+    assert np.hypot(*away.T).min() > 0.25
+    assert np.hypot(*(run.poses[-1, :2] - walk[-1])) < 0.3
+
+
+def test_a_world_of_many_kilometres_is_refused(task):
+    """Not performed on for ever, and not on a map of a terabyte: the error says how large it may be."""
+    with pytest.raises(ValueError, match="must hold all places and objects, got 1e"):
+        perform(task, Unicycle((1e6, 1e6, 0.0)))
+
+
+def test_clearance_is_that_of_each_periods_map():
+    """A map that is no longer in force is not kept."""
+    clearance, near = performing.Clearance(), ObstacleMap.of(Environment([[0, 0, 1, 1]]))
+    gone = weakref.ref(near)
+    expected = [near.edge(1.5, 0.5), near.edge(2.0, 0.5)]
+    clearance.add(1.5, 0.5, near)
+    clearance.add(2.0, 0.5, near)
+    del near
+    empty = ObstacleMap.of(Environment([]))
+    clearance.add(2.0, 0.5, empty)
+    assert clearance.all() == pytest.approx([*expected, empty.edge(2.0, 0.5)], abs=1e-4) and gone() is None

@@ -323,7 +323,7 @@ def test_a_run_of_old_is_on_the_usual_way():
     ("change", "message"),
     [
         ({"ways": ()}, "must have a way, .* got 0 ways"),
-        ({"shown": (3,)}, r"shown must count each, got 2 ways and \(3,\)"),
+        ({"shown": (3,)}, r"shown must count each, got 2 ways and \[3\]"),
         ({"environment": Environment([[5.7, -0.3, 6.3, 0.3]])}, "subgoal 0 must be free"),
     ],
 )

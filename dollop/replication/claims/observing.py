@@ -17,6 +17,7 @@ import joblib
 import numpy as np
 
 from dollop.foreground import near_together, seen_free
+from dollop.formats.kinds import Kind
 from dollop.formats.writing import whole_file
 from dollop.lab.person import smooth_path, walk
 from dollop.laser import LaserLog
@@ -332,6 +333,7 @@ MODELS = {
 
 NOISES = tuple(float(noise) for noise in np.round(np.geomspace(0.03, 30, 13), 3))
 CHOSEN = Path(__file__).with_name("chosen.json")
+CHOICE = Kind("chosen noises", rb'\A\{\s*"parameters":')
 
 
 def motion(name):
@@ -357,7 +359,7 @@ def choose_noises(seeds=range(10_000, 10_010), jobs=-1):
     best = np.sum(errors, axis=0).argmin(axis=1)
     noises = {name: NOISES[k] for name, k in zip(MODELS, best, strict=True)}
     content = {"parameters": {"seeds": [*seeds], "candidates": NOISES}, "noises": noises}
-    with whole_file(CHOSEN, "w") as stream:
+    with whole_file(CHOSEN, "w", CHOICE) as stream:
         stream.write(json.dumps(content, indent=1) + "\n")
 
 

@@ -16,7 +16,8 @@ from tqdm import tqdm
 from dollop import plot
 from dollop.checks import need
 from dollop.formats.files import FormatError
-from dollop.formats.writing import check_writable, whole_file
+from dollop.formats.kinds import PNG, Kind
+from dollop.formats.writing import check_writable, together, whole_file
 from dollop.replication import gallery
 from dollop.replication.figures import environment, learning, moved, observing, performing  # noqa: F401
 from dollop.replication.figures.panel import PANELS
@@ -25,6 +26,9 @@ __all__ = ["FIGURES", "main", "make"]
 
 FIGURES = {each.id: each for each in sorted(PANELS.values(), key=lambda each: each.picture)}
 """Every panel by id, in the paper's order; the modules above register theirs when imported."""
+
+METRICS = Kind("numbers of figures", rb'\A\s*\{\s*(?:\}|"\w+": ?\{)')
+GALLERY = Kind("a gallery", rb"\A# The figures\n")
 
 DESCRIPTION = "Make the figures named by id, or all."
 
@@ -52,15 +56,20 @@ def make(id, folder):
     panel = FIGURES[id]
     with plot.style():
         figure, metrics = panel.draw()
-        with whole_file(folder / panel.picture) as stream:
-            figure.savefig(stream, format="png", metadata={"Software": None})
-        plt.close(figure)
+        try:
+            with whole_file(folder / panel.picture, kind=PNG) as stream:
+                figure.savefig(stream, format="png", metadata={"Software": None})
+        finally:
+            plt.close(figure)
     plain = json.loads(json.dumps(metrics, default=float))
     return {name: rounded(value) for name, value in plain.items()}
 
 
 def main(arguments=None):
     """Make the figures named by id, or all; the command line of `python -m dollop.figures`.
+
+    A panel is written together with its numbers and the gallery: after an interrupt, or a kill, those
+    that are done are there with theirs, and the others are as they were.
 
     Parameters
     ----------
@@ -74,7 +83,7 @@ def main(arguments=None):
     FormatError
         A metrics.json that is not JSON: told before the work.
     KeyboardInterrupt
-        When interrupted, with what became of the numbers.
+        When interrupted, with how many panels are done.
     ImportError
         What a panel needs is missing: told before the work as well.
     """
@@ -91,16 +100,20 @@ def main(arguments=None):
         need(FIGURES[id].extra)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        check_writable(folder / "metrics.json")
+        numbers_in(folder)
+        check_writable(folder / "metrics.json", METRICS)
+        check_writable(folder / "README.md", GALLERY)
     except OSError as error:
         parser.error(f"the folder {folder} cannot be written to: {error}")
-    standing = numbers_in(folder)
-    made = tqdm(panels, desc="figures", unit="panel", file=sys.stderr)
+    made, done = tqdm(panels, desc="figures", unit="panel", file=sys.stderr), 0
     try:
-        write_numbers(folder, standing | {id: make(id, folder) for id in made})
+        for done, id in enumerate(made):  # noqa: B007
+            with together():
+                numbers = make(id, folder)
+                write_numbers(folder, numbers_in(folder) | {id: numbers})
     except KeyboardInterrupt:
         made.close()
-        raise KeyboardInterrupt(f"{folder}/metrics.json is as it was") from None
+        raise KeyboardInterrupt(f"{done} of {len(panels)} panels are done, with their numbers") from None
     print(f"wrote {len(panels)} panels, metrics.json and the gallery README.md into {folder}/")
 
 
@@ -114,9 +127,10 @@ def numbers_in(folder):
 
 
 def write_numbers(folder, numbers):
-    """Write metrics.json and the gallery, panels in the paper's order."""
+    """Write the gallery and metrics.json, both or neither, panels in the paper's order."""
     numbers = {id: numbers[id] for id in FIGURES if id in numbers}
-    with whole_file(folder / "metrics.json", "w") as stream:
-        stream.write(json.dumps(numbers, indent=1) + "\n")
-    with whole_file(folder / "README.md", "w") as stream:
-        stream.write(gallery.page(FIGURES.values(), numbers))
+    with together():
+        with whole_file(folder / "README.md", "w", GALLERY) as stream:
+            stream.write(gallery.page(FIGURES.values(), numbers))
+        with whole_file(folder / "metrics.json", "w", METRICS) as stream:
+            stream.write(json.dumps(numbers, indent=1) + "\n")

@@ -14,7 +14,8 @@ import pandas as pd
 
 from dollop.checks import need
 from dollop.formats.files import FormatError
-from dollop.formats.writing import check_writable, whole_file
+from dollop.formats.kinds import PNG, Kind
+from dollop.formats.writing import check_writable, together, whole_file
 from dollop.replication.running import as_json, going_on_in, put_between_marks, report_beside, run_all
 from dollop.replication.worlds.chain import CAUSES, COLUMNS, OUTCOMES, judge
 from dollop.replication.worlds.draw import KINDS, draw
@@ -26,6 +27,8 @@ WORST = 12
 """How many worlds the sheet of pictures shows."""
 FIRST = "worlds_first.csv"
 """The table of the first run, before anything was mended; beside the table if it is there."""
+SUMMARY = Kind("a summary of worlds", rb'\A\{\s*"seeds":')
+REPORT = Kind("a report", rb"\A#|<!-- \w+: begin -->")
 
 
 def work(seed, _=None):
@@ -213,9 +216,11 @@ def draw_sheet(seeds, path):
             label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
         }
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles) or 1)
-        with whole_file(path) as stream:
-            figure.savefig(stream, dpi=80)
-        plt.close(figure)
+        try:
+            with whole_file(path, kind=PNG) as stream:
+                figure.savefig(stream, format="png", dpi=80)
+        finally:
+            plt.close(figure)
 
 
 # ---- the command
@@ -250,22 +255,26 @@ def command(options):
 
 
 def publish(table, folder):
-    """Write the summary and the sheet of the worst, and the tables in REPLICATION.md if it tells of these worlds."""
+    """Write the sheet of the worst and the summary, and the tables in REPLICATION.md if it tells of these worlds.
+
+    All of them, or none. The report, which people wrote, comes last, so that it is there at any time.
+    """
     found = summary(table)
     first = folder / FIRST
     before = summary(read_table(first)) if first.exists() else None
     before = None if before == found else before
     for kind, counts in found["kinds"].items():
         print(f"{kind:15}" + "".join(f"{name} {count:<5}" for name, count in counts.items()))
-    with whole_file(folder / "worlds.json", "w") as stream:
-        stream.write(as_json(found))
     sheet = folder / "worlds_worst.png"
-    draw_sheet(worst_seeds(table), sheet)
     written_too = [folder / "worlds.csv", folder / "worlds.json", sheet]
     report = report_beside(folder)
-    if report and table.index.tolist() == list(range(SEEDS)):
-        text = put_between_marks(report.read_text(), "worlds", tables(found, before))
-        with whole_file(report, "w") as stream:
-            stream.write(text)
-        written_too.append(report)
+    with together():
+        draw_sheet(worst_seeds(table), sheet)
+        with whole_file(folder / "worlds.json", "w", SUMMARY) as stream:
+            stream.write(as_json(found))
+        if report and table.index.tolist() == list(range(SEEDS)):
+            text = put_between_marks(report.read_text(), "worlds", tables(found, before))
+            with whole_file(report, "w", REPORT) as stream:
+                stream.write(text)
+            written_too.append(report)
     print(f"wrote {', '.join(map(str, written_too))}")

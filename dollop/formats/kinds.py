@@ -1,0 +1,120 @@
+"""What a file holds, told by its beginning: so that none is replaced by one of another kind."""
+
+import codecs
+import os
+import re
+import zlib
+from pathlib import Path
+from typing import NamedTuple
+
+from dollop.checks import shortened
+
+__all__ = [
+    "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "PGM", "PNG", "ROS_MAP", "SCENE", "TASK", "TRAJECTORY",
+    "TRUTH", "Kind", "check_is_nobodys", "check_replaceable",
+]  # fmt: skip
+
+HEAD = 4096
+"""Bytes of a file, packed or not, by which its kind is told: a block of a disk."""
+
+
+class Kind(NamedTuple):
+    """A kind of file that is written here.
+
+    Attributes
+    ----------
+    name : str
+        With its article, as messages tell it.
+    pattern : bytes
+        Regular expression that is found in the first 4 kB of every file of this kind, unpacked.
+    """
+
+    name: str
+    pattern: bytes
+
+
+_MESSAGE = rb"(?:[FR]LASER|ROBOTLASER\d|RAWLASER\d|ODOM|PARAM) "
+_MOVING = rb"(?:x|y|heading|object_x|object_y|laser_x|laser_y|laser_theta)(?:_\d+)?"
+_TRUTH = rb"\A(?=.*(?:heading|object_x|laser_x))t(?:," + _MOVING + rb")+\r?\n"
+
+CARMEN_LOG = Kind("a CARMEN log", rb"(?m)\A# CARMEN Logfile|^" + _MESSAGE)
+CARMEN_MAP = Kind("a CARMEN map", rb"\A(?:(?:#.*)?\n)*CARMENMAPFILE")
+ROS_MAP = Kind("a ROS map", rb"(?m)^[{\s]*[\"']?image[\"']?\s*:")
+PGM = Kind("a PGM picture", rb"\AP[25]\s")
+PNG = Kind("a PNG picture", rb"\A\x89PNG\r\n\x1a\n")
+TASK = Kind("a task", rb'\A\s*\{[^{}\[\]]*"format":\s*"dollop task"')
+SCENE = Kind("a scene", rb'\A\s*\{[^{}\[\]]*"format":\s*"dollop scene"')
+TRAJECTORY = Kind("a trajectory", rb"\At,x,y,occluded\r?\n")
+EVERYBODY = Kind("a table of everybody's trajectories", rb"\At,x,y,occluded,person\r?\n")
+TRUTH = Kind("the truth of a recording", _TRUTH)
+_BAG = Kind("a ROS bag", rb"\A(?:#ROSBAG|\x89MCAP|SQLite format 3)")
+
+_KNOWN = CARMEN_LOG, CARMEN_MAP, PGM, PNG, TASK, SCENE, TRAJECTORY, EVERYBODY, TRUTH, _BAG, ROS_MAP
+
+
+def check_replaceable(path, kind):
+    """Refuse to replace a file that is not empty by one of another kind.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file that is there.
+    kind : Kind
+        What is to be written.
+
+    Raises
+    ------
+    FileExistsError
+        If the file holds something else; by its first 4 kB, unpacked.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile() as file:
+    ...     check_replaceable(file.name, TASK)
+    ...     file.write(b"# CARMEN Logfile"), file.flush()
+    ...     check_replaceable(file.name, TASK)
+    Traceback (most recent call last):
+    FileExistsError: it holds a CARMEN log and not a task: remove it first, or choose another name
+    """
+    head = _head(path)
+    if head and not re.search(kind.pattern, head):
+        rule = "remove it first, or choose another name"
+        known = (each.name for each in _KNOWN if re.search(each.pattern, head))
+        raise FileExistsError(f"it holds {next(known, 'something else')} and not {kind.name}: {rule}")
+
+
+def check_is_nobodys(picture, of=None):
+    """Refuse the name of a picture that a map beside it names, there or not.
+
+    Parameters
+    ----------
+    picture : str or Path
+    of : str or Path, optional
+        The map whose picture it is: this one may name it.
+
+    Raises
+    ------
+    FileExistsError
+        If another `.yaml` or `.yml` beside it names it in its first 4 kB.
+    """
+    picture = Path(picture)
+    name = re.escape(os.fsencode(picture.name))
+    names_it = rb"(?m)\bimage\b[^\n]*[\s/\"':]" + name + rb"(?:[\s\"',}#]|\Z)"
+    own = None if of is None else os.path.realpath(of)
+    for other in sorted((*picture.parent.glob("*.yaml"), *picture.parent.glob("*.yml"))):
+        readable = other.is_file() and os.access(other, os.R_OK)
+        if readable and os.path.realpath(other) != own and re.search(names_it, _head(other)):
+            raise FileExistsError(f"it is the picture of the map {shortened(other.name, 80)}: choose another name")
+
+
+def _head(path):
+    """The first bytes of a file, unpacked if it is gzipped, without a byte order mark."""
+    with open(path, "rb") as stream:
+        head = stream.read(HEAD)
+    if head.startswith(b"\x1f\x8b"):
+        try:
+            return zlib.decompressobj(wbits=31).decompress(head, HEAD)
+        except zlib.error:
+            return head
+    return head.removeprefix(codecs.BOM_UTF8)
