@@ -46,7 +46,8 @@ CANS = [[1.2, 0.8, 1.5, 1.1], [3.0, 1.7, 3.4, 2.1]]
 
 def finite(name, values, also=()):
     """Something that was accepted is finite, or one of the values that may be there as well."""
-    values = np.asarray(values, dtype=float)
+    with np.errstate(over="ignore"):  # of what is wider than a float
+        values = np.asarray(values, dtype=float)
     odd = ~np.isfinite(values)
     for allowed in also:
         odd &= ~(np.isnan(values) if np.isnan(allowed) else values == allowed)
