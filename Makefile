@@ -37,6 +37,7 @@ fuzz: .venv/ready  ## damaged files, hostile calls, kills: half an hour; FUZZ_FI
 	$(RUN) tests/fuzzing --files $(FUZZ_FILES) --calls $(FUZZ_CALLS) --seed $(FUZZ_SEED)
 	$(RUN) tests/fuzzing/kills.py --kills $(FUZZ_KILLS) --seed 0
 	$(RUN) tests/fuzzing/study_kills.py --kills $(FUZZ_KILLS) --seed 0
+	$(RUN) tests/fuzzing/study_kills.py --kills $(FUZZ_KILLS) --seed 1 --at-once 4
 
 check: .venv/ready  ## lint and formatting
 	$(RUN) -m ruff check .
