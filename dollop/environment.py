@@ -32,6 +32,7 @@ from dollop.pose import wrapped
 __all__ = [
     "Environment",
     "Seen",
+    "checked_boxes",
     "corner_indices",
     "integer_costs",
     "spring_constants",
@@ -167,8 +168,7 @@ class Environment:
     directions: np.ndarray = None
 
     def __post_init__(self):
-        none = isinstance(self.boxes, list | tuple | np.ndarray) and len(self.boxes) == 0
-        boxes = checked_positions("boxes", np.empty((0, 4)) if none else self.boxes, "N", 4)
+        boxes = checked_boxes(self.boxes)
         negative = np.flatnonzero((boxes[:, 2:] < boxes[:, :2]).any(axis=1))
         if len(negative):
             found = f"{boxes[negative[0]].tolist()} for object {negative[0]}"
@@ -205,6 +205,13 @@ class Environment:
         where = ", ".join(f"({x:.2f}, {y:.2f})" for x, y in self.centres[:6])
         more = f", ... {len(self) - 6} more" if len(self) > 6 else ""
         return f"Environment of {len(self)} objects" + (f" round {where}{more}" if len(self) else "")
+
+
+def checked_boxes(boxes):
+    """Boxes (N, 4) in m as a float array of their own; an empty list is none of them."""
+    shape = np.shape(boxes) if isinstance(boxes, np.ndarray) else ()
+    none = shape[:1] == (0,) or (isinstance(boxes, list | tuple) and not boxes)
+    return checked_positions("boxes", np.empty((0, 4)) if none else boxes, "N", 4)
 
 
 def checked_directions(directions, n):
@@ -342,7 +349,8 @@ def _springs(corners):
     """Spring constants (C, C) and differences omega_n - omega_m (C, C, 2) between corners."""
     corners = checked_positions("corners", corners)
     if len(corners) > MOST_CORNERS:
-        raise ValueError(f"springs must be between at most {MOST_CORNERS} corners, got {len(corners)}")
+        rule = f"springs must be between at most {MOST_CORNERS} corners"
+        raise ValueError(f"{rule}, got {len(corners)}")
     differences = corners - corners[:, None]
     squares = np.einsum("mnd,mnd->mn", differences, differences)
     np.fill_diagonal(squares, np.inf)

@@ -121,8 +121,8 @@ class OccupancyGrid:
         Raises
         ------
         ValueError
-            If the grid would have more than 25 million cells or not lie within 1e9 m of the origin, if
-            `max_range` is no length, or `resolution` is not from 1 mm to 1 km.
+            If the grid would have more than 25 million cells or not lie within 1e9 m of the origin,
+            if `max_range` is no length, or `resolution` is not from 1 mm to 1 km.
 
         Notes
         -----
@@ -492,7 +492,7 @@ def _frame(points, resolution):
 
 
 def _occupancy(log, some, reach, is_hit, origin, resolution, shape):
-    """Hits by hits and passes (H, W), NaN where there is neither, counted in some scans after others."""
+    """Hits by hits and passes (H, W), NaN where there is neither, some scans after others."""
     hits, passes = (np.zeros(shape, dtype=int) for _ in range(2))
     for scans in some:
         begins, directions, ends = _rays(log, scans, reach)
@@ -510,7 +510,7 @@ def _occupancy(log, some, reach, is_hit, origin, resolution, shape):
 
 
 def _cuts(steps):
-    """Where to cut beams of so many steps (N,) into parts, so that none has many more than `POINTS` in all."""
+    """Where to cut beams of so many steps (N,) into parts of not many more than `POINTS` in all."""
     return 1 + np.flatnonzero(np.diff(np.cumsum(steps) // POINTS))
 
 
@@ -521,7 +521,7 @@ def _counts(points, origin, resolution, shape):
 
 
 def _passed(begins, directions, steps, phases, resolution):
-    """Points a cell apart along beams (N, 2), as many as there are `steps` (N,), the first by phases of a cell."""
+    """Points a cell apart along beams (N, 2), as many as there are `steps` (N,)."""
     along = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
     along = along + np.repeat(phases, steps)
     starts, ways = np.repeat(begins, steps, axis=0), np.repeat(directions, steps, axis=0)

@@ -49,6 +49,7 @@ from dollop.checks import (
     checked_whole,
     checked_wholes,
     put_in,
+    shortened,
     told,
 )
 from dollop.environment import Environment, corner_indices, integer_costs
@@ -307,7 +308,8 @@ def match(environment_i, environment_j, method="robust", moved=0.4):
     checked_record("environment_j", environment_j, Environment)
     most = max(len(environment_i), len(environment_j))
     if most > MOST_OBJECTS:
-        raise ValueError(f"environments to match must have at most {MOST_OBJECTS} objects, got {most}")
+        rule = f"environments to match must have at most {MOST_OBJECTS} objects"
+        raise ValueError(f"{rule}, got {most}")
     if method == "robust":
         return _match_robustly(environment_i, environment_j, moved)
     counts = f"{len(environment_i)} and {len(environment_j)}"
@@ -364,8 +366,8 @@ def match_surely(environment_i, environment_j, names):
     nothing = not (matching.sure & (matching.partners >= 0)).any()
     if nothing and min(len(environment_i), len(environment_j)):
         rule = f"no pair reaches the {_percent(SURE)} that it takes"
-        advice = "give the matching, as adapt(environment, matching=Matching.of_partners([...]))"
-        advice += " or learn(..., matchings=[...]), or move the objects apart"
+        advice = "give matching= or matchings=, see Matching.of_partners, or move the objects apart"
+        found = shortened(found, 80)
         raise ValueError(f"{pair} cannot be matched with confidence: {found}; {rule}; {advice}")
     if not len(doubtful):
         return matching, ()

@@ -268,6 +268,9 @@ class Observer:
             For a scan that is older than the last, or numbers that are none.
         """
         ranges = checked_array("ranges", ranges, len(self.angles), finite=False)
+        farthest = ranges.max(where=np.isfinite(ranges), initial=0)
+        if farthest > FARTHEST:
+            raise ValueError(f"a range must be within {FARTHEST:g} m, or inf, got {farthest:g}")
         if not (ranges >= 0).all():
             raise ValueError(f"a range must not be negative or NaN, got {ranges[~(ranges >= 0)][0]}")
         pose, t = checked_positions("pose", pose, 3), checked_number("t", t, -LATEST, LATEST)
@@ -539,7 +542,7 @@ def checked_user(user):
     if isinstance(user, str):
         check_choice("user", user, ("fastest",))
         return user
-    if isinstance(user, int | np.integer) and not isinstance(user, bool):
+    if isinstance(user, int | np.integer) and not isinstance(user, bool | np.timedelta64):
         return int(user)
     return checked_positions("user", user, 2)
 
@@ -705,6 +708,7 @@ def observe_as_paper(
     """
     checked_record("log", log, LaserLog)
     checked_record("background", background, OccupancyGrid)
+    checked_number("the background's resolution", background.resolution, *RESOLUTIONS)
     checked_number("background_radius", background_radius, 1 / FARTHEST)
     checked_number("min_area", min_area, 0)
     checked_number("stride", stride, 0)

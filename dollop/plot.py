@@ -17,6 +17,7 @@ from matplotlib.patches import Circle, Ellipse, Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 
 from dollop.checks import checked_array, checked_number, checked_positions, checked_whole
+from dollop.environment import checked_boxes
 from dollop.foreground import endpoints
 from dollop.trajectory import arc_length
 
@@ -169,8 +170,7 @@ def boxes(ax, boxes, label=None, colour=OBSTACLE, **look):
         Options of `matplotlib.patches.Rectangle`.
     """
     look = {"fill": False, "edgecolor": colour, "linewidth": 2, "label": label} | look
-    none = isinstance(boxes, list | tuple | np.ndarray) and len(boxes) == 0
-    for x0, y0, x1, y1 in () if none else checked_positions("boxes", boxes, "N", 4):
+    for x0, y0, x1, y1 in checked_boxes(boxes):
         ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **look))
         look["label"] = None
 

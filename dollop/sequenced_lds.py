@@ -51,7 +51,7 @@ LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none wou
 REACH = 0.01  # m, to which lines are rolled out
 TURNED = np.radians(10)  # over two decimetres: on a radius of 1.1 m, which is no corner
 ROUNDS = 8  # how often a walk is divided anew: nearly always two are enough
-MOST_CANDIDATES = 1000  # errors of all pairs of cuts are held at once
+MOST_CANDIDATES = 400  # the time grows with their cube: some seconds, where 100 take a tenth of one
 SPEEDS = 1e-24, 1e24  # m/s: no walk within 1e9 m shows others, by whatever clock
 PERIODS = 1e-6, 1e6  # s
 LONGEST_PAUSE = 1e11  # s
@@ -172,7 +172,7 @@ class SequencedLDS:
             Time between samples in s; only `speeds` depends on it.
         candidates : int
             Number of places, at equal distances, where the trajectory may be cut, both its ends
-            included. The time taken grows with the cube.
+            included; at most 400, for the time taken grows with the cube.
 
         Returns
         -------

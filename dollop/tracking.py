@@ -355,7 +355,7 @@ class Tracker:
         check_choice("matching", self.matching, MATCHERS)
         check_choice("occlusion", self.occlusion, ("kalman", "particles"))
         for name in ("gate", "gate_min", "gate_max", "disappear_after"):
-            checked_number(name, getattr(self, name), 1 / MOST_NUMBER, np.inf)
+            checked_number(name, getattr(self, name), 1 / MOST_NUMBER, MOST_NUMBER)
 
 
 def track_objects(t, objects, tracker=None, visible=None, seed=0):

@@ -295,6 +295,9 @@ def retime(points, n=60, decay=3.0):
 def distance_to_polyline(points, polyline):
     """Distance of each point to the nearest place on a polyline, its edges included.
 
+    Memory grows with N + M, time with N log M or so; with N M where all points are as far from all
+    edges.
+
     Parameters
     ----------
     points : (N, d) array_like
@@ -336,6 +339,9 @@ def _distance_to_edges(points, starts, edges):
         middle = (points[some].min(axis=0) + points[some].max(axis=0)) / 2
         radius = np.linalg.norm(points[some] - middle, axis=1).max()
         apart = _to_each_edge(middle[None], starts, edges)[0]
+        if radius == 0:  # all are one place
+            nearest[some] = apart.min()
+            continue
         near = ~(apart > (1 + 1e-9) * (apart.min() + 2 * radius))
         nearest[some] = _distance_to_edges(points[some], starts[near], edges[near])
     return nearest

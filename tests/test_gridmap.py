@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from dollop import gridmap
 from dollop.formats.files import FormatError
 from dollop.formats.logs import read_log
 from dollop.gridmap import OccupancyGrid, distances_to
@@ -295,3 +297,31 @@ def test_distances_are_those_of_all_pairs(shape):
     every = np.argwhere(np.ones(shape))
     apart = np.linalg.norm(every[:, None] - np.argwhere(cells), axis=2).min(axis=1)
     assert distances_to(cells, 0.1) == pytest.approx(0.1 * apart.reshape(shape))
+
+
+@pytest.mark.parametrize("resolution", [1e300, 1001.0, 1e-4, "0.05", True])
+def test_a_resolution_that_no_map_has_is_named(resolution):
+    """From a millimetre, which no laser tells, to a kilometre."""
+    with pytest.raises(ValueError, match="resolution must be (in 0.001 to 1000|a finite number)"):
+        OccupancyGrid.from_log(room_log([(0, 0, 0)]), resolution)
+
+
+def test_a_map_is_refused_before_there_is_room_for_it():
+    """A log of two scans 600 m apart, whose map had 100 million cells, costs next to nothing."""
+    log = replace(room_log([(0, 0, 0), (1, 1, 0)]), poses=[(0, 0, 0), (490, 490, 0)])
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match="cells are more than 25000000, the most that a map has"):
+            OccupancyGrid.from_log(log)
+        assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_map_is_the_same_in_whatever_parts_it_is_counted(monkeypatch):
+    """Beam by beam, or all at once."""
+    log = room_log([(0, 0, 0), (0.3, 0.2, 1.0), (-0.5, 0.1, 2.0)])
+    whole = OccupancyGrid.from_log(log)
+    monkeypatch.setattr(gridmap, "POINTS", 7)
+    monkeypatch.setattr(gridmap, "READINGS", 100)
+    np.testing.assert_array_equal(OccupancyGrid.from_log(log).occupancy, whole.occupancy)

@@ -293,3 +293,36 @@ def test_hostile_calls_are_refused_in_a_line(call, value):
     with pytest.raises(ValueError) as refused:
         call(value)
     assert len(str(refused.value)) <= 300 and "\n" not in str(refused.value)
+
+
+def test_what_hostile_calls_found_stays_mended():
+    """A range of 1e308 m, boxes that are one number, more candidates than there is time for, and a billion walks."""
+    grid = dollop.OccupancyGrid(np.pad(np.zeros((9, 9)), 1, constant_values=1.0), (0.0, 0.0), 0.1)
+    with pytest.raises(ValueError, match=r"a range must be within 1e\+09 m, or inf, got 1e\+308"):
+        dollop.Observer(grid, [0.0, 0.1]).step(0.0, [1.0, 1e308], [0.5, 0.5, 0.0])
+    with pytest.raises(ValueError, match=r"boxes must have shape \(N, 4\), got \(\)"):
+        dollop.Environment(np.array(1.0))
+    with pytest.raises(ValueError, match="candidates must be a whole number, 3 to 400, got 1000"):
+        dollop.SequencedLDS.fit(WALK, candidates=1000)
+    with pytest.raises(ValueError, match="user must be numbers"):
+        dollop.Observer(grid, [0.0, 0.1], np.timedelta64(3, "s"))
+    lost = SimpleNamespace(pose=1.0, localised=False, limits=PIONEER_LIMITS, period=0.1, drive=print)
+    with pytest.raises(ValueError, match=r"the robot's pose must have shape \(3,\), got \(\)"):
+        dollop.perform(TASK, lost)
+    with pytest.raises(ValueError, match="sequences must be at most 100000"):
+        dollop.SubgoalHMM.fit(np.broadcast_to(1.0, (10**9, 2)))
+
+
+def test_a_walk_that_leaps_has_a_speed_of_this_world():
+    """Over a part of the way that took no time it was 1e305 m/s."""
+    law = dollop.SequencedLDS.fit([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]], retimed=False)
+    assert law.profile.max() < 1e12 and np.isfinite(law.timed()[1]).all()
+
+
+def test_a_refused_matching_of_many_objects_is_told_in_a_line():
+    """However many there are."""
+    rng = np.random.default_rng(0)
+    here, there = (dollop.Environment(np.tile(rng.uniform(0, 6, (40, 2)), 2) + [0, 0, 0.4, 0.4]) for _ in range(2))
+    with pytest.raises(ValueError, match="cannot be matched with confidence: 0 .* move the objects apart$") as refused:
+        dollop.associate(LAW.subgoals, here).relocate(there)
+    assert len(str(refused.value)) <= 300

@@ -185,9 +185,9 @@ def test_handwritten_letters_are_drawn(letter):
         ({"n_segments": 50}, "n_segments must be a whole number, 1 to 49, got 50"),
         ({"n_segments": 2.5}, "n_segments must be a whole number"),
         ({"n_segments": np.nan}, "n_segments must be a whole number.*got nan"),
-        ({"candidates": 10**6}, "candidates must be a whole number, 3 to 1000, got 1000000"),
+        ({"candidates": 10**6}, "candidates must be a whole number, 3 to 400, got 1000000"),
         ({"sample_period": -0.1}, "sample_period must be in 1e-06 to 1e.06, got -0.1"),
-        ({"candidates": 2}, "candidates must be a whole number, 3 to 1000, got 2"),
+        ({"candidates": 2}, "candidates must be a whole number, 3 to 400, got 2"),
         ({"tolerance": 1e-6}, r"tolerance 1e-06 m cannot be kept with 100 candidate cuts, 0\.\d+ "),
     ],
 )

@@ -7,11 +7,11 @@ log began.
 
 import gzip
 from contextlib import nullcontext
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
-from dollop.checks import check_positive, checked_number, told
+from dollop.checks import FARTHEST, check_positive, checked_number, told
 from dollop.formats.files import MAX_LINES, FormatError, from_file, read_lines
 from dollop.formats.kinds import CARMEN_LOG
 from dollop.formats.odometry import Odometry
@@ -20,7 +20,6 @@ from dollop.formats.scans import (
     Beams,
     Scan,
     check_beams,
-    check_metres,
     doubtful,
     forgive,
     forgive_disorder,
@@ -79,8 +78,8 @@ def read_log(path, max_range=None, fov=None):
     ------
     FormatError
         If the file is no CARMEN log, holds no scan, more than a few scans are broken
-        (`dollop.formats.scans.forgive`), or there is more of it than is read: 100 million readings, 36,000
-        beams in a scan, and what `dollop.formats.files.read_lines` says.
+        (`dollop.formats.scans.forgive`), or there is more of it than is read: 100 million
+        readings, 36,000 beams in a scan, and what `dollop.formats.files.read_lines` says.
     ValueError
         If `max_range` is not positive and finite, if `fov` is not an angle up to a full turn, or is
         told of messages that state their own.
@@ -141,7 +140,8 @@ def _closes(ranges):
 
 def _scans(path, fov):
     """All good scans of the preferred message by their line, and the reason of the broken ones."""
-    robot, plain = _messages(path, {b"ROBOTLASER1": _parse_robotlaser, b"FLASER": partial(_parse_flaser, fov=fov)})
+    flaser = partial(_parse_flaser, fov=fov)
+    robot, plain = _messages(path, {b"ROBOTLASER1": _parse_robotlaser, b"FLASER": flaser})
     if robot[0] and fov is not None:
         raise ValueError(f"{path}: ROBOTLASER1 messages state their field of view, got fov={fov:g}")
     for good, bad in (robot, plain):
@@ -152,7 +152,7 @@ def _scans(path, fov):
 
 
 def _messages(path, parsers):
-    """What each good message holds, by its line, and the reason of each broken one: both for each name.
+    """What each good message holds, by its line, and the reason of each broken one, for each name.
 
     Of several names the first that a good message has is read from there on, and no other.
     """
@@ -161,7 +161,8 @@ def _messages(path, parsers):
     for number, line in enumerate(read_lines(path), 1):
         if not line.lstrip().startswith(names):
             continue
-        name, *_ = fields = line.split()
+        fields = line.replace(b"_", b"__").split()  # of one within a number Python is tolerant
+        name = fields[0]
         if name not in names:
             continue
         good, bad = found[name]
@@ -169,11 +170,12 @@ def _messages(path, parsers):
             good[number] = parsers[name](fields)
             names, room = names[: names.index(name) + 1], room - len(fields)
         except ValueError as error:
-            bad[number] = str(error)[:200]  # what it repeats may be as long as the file
+            bad[number] = str(error)[:200].replace("__", "_")  # as long as what it repeats
         if len(bad) > MAX_LINES // 100:  # more than are forgiven, however many follow
             break
         if room < 0:
-            raise FormatError(f"more than {MAX_READINGS} readings, the most that is read", path, number)
+            rule = f"more than {MAX_READINGS} readings, the most that is read"
+            raise FormatError(rule, path, number)
     return found.values()
 
 
@@ -184,10 +186,10 @@ def _parse_flaser(fields, fov=None):
     count = _count(fields, 1)
     _check_ending(fields, 9 + count)
     beams = _flaser_beams(count, fov)
-    check_beams(beams)
-    return _scan(beams, fields[2 : 2 + count], fields[2 + count : 9 + count])
+    return _scan(beams, fields[2 : 2 + count], _numbers(fields[2 + count : 9 + count]))
 
 
+@lru_cache(maxsize=16)
 def _flaser_beams(count, fov=None):
     """Beams of a FLASER line, which does not state their bearings, over `fov` in rad if it is told.
 
@@ -197,12 +199,15 @@ def _flaser_beams(count, fov=None):
     in `readlog.c`). The first beam is at -90 degrees. In a scan of 100 degrees it is at -50 here,
     where CARMEN leaves it at -90 too, which no such laser does.
     """
+    per_degree = PER_DEGREE.get(count)
     if fov is not None:
         step = fov / max(count - 1, 1)
-        return Beams(count, -step * (count - 1) / 2, step, None, is_sick=True)
-    per_degree = PER_DEGREE.get(count)
-    step = np.deg2rad(1 / per_degree if per_degree else 180 / max(count - 1, 1))
-    return Beams(count, np.deg2rad(-50 if per_degree == 4 else -90), step, None, is_sick=True)
+        beams = Beams(count, -step * (count - 1) / 2, step, None, is_sick=True)
+    else:
+        step = np.deg2rad(1 / per_degree if per_degree else 180 / max(count - 1, 1))
+        beams = Beams(count, np.deg2rad(-50 if per_degree == 4 else -90), step, None, is_sick=True)
+    check_beams(beams)
+    return beams
 
 
 def _parse_robotlaser(fields):
@@ -213,20 +218,29 @@ def _parse_robotlaser(fields):
     count = _count(fields, 8)
     rest = 10 + count + _count(fields, 9 + count, least=0)
     _check_ending(fields, rest + 12)
-    kind, start, _, step, limit = _numbers(fields[1:6]).tolist()
+    kind, start, _, step, limit, *ending = _numbers(fields[1:6] + fields[rest : rest + 12])
+    return _scan(_robotlaser_beams(count, start, step, limit, kind), fields[9 : 9 + count], ending)
+
+
+@lru_cache(maxsize=16)
+def _robotlaser_beams(count, start, step, limit, kind):
+    """Beams of a ROBOTLASER1 line, which are those of the line before."""
     check_positive("an angular resolution", step)
     check_positive("a maximum range", limit)
     beams = Beams(count, start, step, limit, kind in SICK_TYPES)
     check_beams(beams)
-    return _scan(beams, fields[9 : 9 + count], fields[rest : rest + 12])
+    return beams
 
 
 def _scan(beams, ranges, ending):
     """The scan of a message that ends with the laser's pose, what does not matter, and the time."""
-    ranges, ending = _numbers(ranges), _numbers(ending)
-    check_positive("a range", ranges.min(), or_zero=True)
-    check_metres("a range", ranges)
-    check_metres("a pose", ending[:3])
+    ranges = np.array(list(map(float, ranges)))
+    if not (np.minimum.reduce(ranges) >= 0 and np.maximum.reduce(ranges) <= FARTHEST):
+        wrong = next(each for each in ranges if not 0 <= each <= FARTHEST)
+        rule = f"a range must be finite, not negative and within {FARTHEST:g} m"
+        raise ValueError(f"{rule}, got {wrong:g}")
+    if max(map(abs, ending[:3])) > FARTHEST:
+        raise ValueError(f"a pose must be within {FARTHEST:g} m, got {ending[:3]}")
     return Scan(beams, ranges, ending[:3], ending[-1])
 
 
@@ -239,8 +253,8 @@ def _parse_odometry(fields):
 def _count(fields, place, least=1):
     """The number of readings that follow; 0 if the line ends before."""
     text = fields[place] if place < len(fields) else b"0"
-    if b"_" in text or len(text) > 9:
-        raise ValueError(f"a number of readings must be a whole number of at most nine digits, got {told(text)}")
+    if len(text) > 9:
+        raise ValueError(f"a number of readings must have at most nine digits, got {told(text)}")
     count = int(text)
     if count < least:
         raise ValueError(f"a number of readings must be at least {least}, got {count}")
@@ -254,13 +268,12 @@ def _check_ending(fields, used):
 
 
 def _numbers(fields):
-    """Numbers as C writes them, (N,)."""
-    if b"_" in b"".join(fields):  # which Python passes over
-        raise ValueError(f"a number has no underscore, got {told(next(each for each in fields if b'_' in each))}")
-    numbers = np.array(list(map(float, fields)))
-    if not np.abs(numbers).max(initial=0) <= LARGEST:
-        wrong = numbers[~(np.abs(numbers) <= LARGEST)][0]
-        raise ValueError(f"the numbers of a message must be finite, and within {LARGEST:g}, got {wrong:g}")
+    """Numbers that are none too large for metres or seconds, a list."""
+    numbers = list(map(float, fields))
+    if not all(map(LARGEST.__ge__, map(abs, numbers))):
+        wrong = next(each for each in numbers if not abs(each) <= LARGEST)
+        rule = f"the numbers of a message must be finite, and within {LARGEST:g}"
+        raise ValueError(f"{rule}, got {wrong:g}")
     return numbers
 
 

@@ -26,7 +26,7 @@ MAP_LABEL = b"CARMENMAPFILEv020"
 GRIDMAP_CHUNK, NAMED_CHUNK = 1, 128
 
 MAX_HEAD, MAX_CHUNKS = 1 << 16, 1000
-"""Bytes of the comment lines, and chunks that are looked through: CARMEN writes ten lines and five chunks."""
+"""Bytes of the comment lines, and chunks that are looked through: CARMEN writes ten and five."""
 
 
 def read_map(path):
@@ -91,7 +91,8 @@ def _gridmap_chunk(path, content, place):
         if kind & ~NAMED_CHUNK == GRIDMAP_CHUNK:
             return chunk.partition(b"\0")[2] if kind & NAMED_CHUNK else chunk
         place += 5 + size
-    raise FormatError(f"no gridmap chunk among the first {MAX_CHUNKS}, the most that are looked through", path)
+    rule = f"among the first {MAX_CHUNKS}, the most that are looked through"
+    raise FormatError(f"no gridmap chunk {rule}", path)
 
 
 def _map_origin(path, head, resolution):

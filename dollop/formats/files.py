@@ -36,12 +36,12 @@ MAX_BYTES = 1 << 30
 PIECE = 1 << 18
 """Bytes that are read at once, so that no more room is taken than the file needs."""
 MAX_LINES, MAX_LINE = 2_000_000, 1 << 20
-"""Lines of a log, and bytes of one: five hours of a hundred messages a second, 100,000 readings in each."""
+"""Lines of a log, and bytes of one: five hours of a hundred messages a second, of many readings."""
 MOST_PACKED, UNPACKED = 100, 1 << 20
-"""How many times its size a packed text may unpack to, and bytes from which on that counts: messages
-differ in their times and readings, and gzip packs what does not differ a thousand times."""
+"""How many times its size a packed text may unpack to, and bytes from which on that counts:
+messages differ in their times and readings, and gzip packs what does not a thousand times."""
 MAX_CELLS = 25_000_000
-"""Cells of a map, or pixels of its picture: 250 m x 250 m at 5 cm, for which a gigabyte is needed."""
+"""Cells of a map, or pixels of its picture: 250 m x 250 m at 5 cm, which take a gigabyte."""
 MAX_JSON, MAX_VALUES = 64 << 20, 1_000_000
 """Bytes and values of a JSON file: a task of an hour's walks in a hall, many times over."""
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
@@ -143,6 +143,7 @@ def warn_of(path, text):
 @contextmanager
 def _opened(path):
     """The file as it is unpacked, for reading, and its size in bytes as it lies there."""
+    path = os.fspath(path)  # a number would be taken for a file that is open already
     if os.path.exists(path) and not os.path.isfile(path):
         kind = "a folder" if os.path.isdir(path) else "a device or a pipe"
         raise FormatError(f"must be an ordinary file, and is {kind}", path)
@@ -151,7 +152,7 @@ def _opened(path):
         stream.seek(0)
         try:
             yield (
-                io.BufferedReader(gzip.GzipFile(fileobj=stream)) if zipped else stream,
+                io.BufferedReader(gzip.GzipFile(fileobj=stream), PIECE) if zipped else stream,
                 os.fstat(stream.fileno()).st_size,
             )
         except (EOFError, gzip.BadGzipFile, zlib.error) as error:
@@ -193,7 +194,7 @@ def read_bytes(path, most=MAX_BYTES):
 
 
 def read_lines(path):
-    """Lines of a text, one after another, unpacked as by `read_bytes`; never more than one is in memory.
+    """Lines of a text, unpacked as by `read_bytes`; never more than one is in memory.
 
     Parameters
     ----------
@@ -219,10 +220,11 @@ def read_lines(path):
                 raise FormatError("binary data, where text is expected", path)
             total += len(line)
             if total > most:
-                rule = f"{MAX_BYTES} bytes, and {MOST_PACKED} times its size, are the most that is read"
+                rule = f"{MAX_BYTES} bytes and {MOST_PACKED} times its size are the most that is read"
                 raise FormatError(f"holds {total} bytes or more, unpacked: {rule}", path)
             if len(line) > MAX_LINE:
-                raise FormatError(f"longer than {MAX_LINE} bytes, the most that is read of a line", path, number)
+                rule = f"longer than {MAX_LINE} bytes, the most that is read of a line"
+                raise FormatError(rule, path, number)
             if number > MAX_LINES:
                 raise FormatError(f"holds more than {MAX_LINES} lines, the most that is read", path)
             yield line if number > 1 else line.removeprefix(codecs.BOM_UTF8)
@@ -253,7 +255,8 @@ def read_json(path, what):
     """
     content = read_bytes(path, MAX_JSON)
     if sum(map(content.count, (b",", b"[", b"{"))) > MAX_VALUES:
-        raise FormatError(f"not {what}: holds more than {MAX_VALUES} values, the most that is read", path)
+        rule = f"holds more than {MAX_VALUES} values, the most that is read"
+        raise FormatError(f"not {what}: {rule}", path)
     numbers = {"parse_constant": _finite, "parse_float": _finite, "parse_int": _whole}
     try:
         return json.loads(content.decode(), object_pairs_hook=_named_once, **numbers)
@@ -264,7 +267,8 @@ def read_json(path, what):
 def _finite(text):
     number = float(text)
     if not math.isfinite(number):
-        raise ValueError(f"a number must be finite, and no more than a float holds, got {shortened(text, 60)}")
+        rule = "a number must be finite, and no more than a float holds"
+        raise ValueError(f"{rule}, got {shortened(text, 60)}")
     return number
 
 
@@ -309,7 +313,8 @@ def check_fields(where, content, names, optional=()):
     """
     names, optional = set(names), set(optional)
     if not isinstance(content, dict):
-        raise ValueError(f"{where} must have {', '.join(sorted(names))}, got {type(content).__name__}")
+        needed = ", ".join(sorted(names))
+        raise ValueError(f"{where} must have {needed}, got {type(content).__name__}")
     for said, wrong in (
         ("lacks", names - set(content)),
         ("cannot have", set(content) - names - optional),
@@ -367,4 +372,5 @@ def check_cells(columns, rows):
         If they are more than 25 million in all.
     """
     if not columns * rows <= MAX_CELLS:
-        raise ValueError(f"{columns:.12g} x {rows:.12g} cells are more than {MAX_CELLS}, the most that a map has")
+        cells = f"{columns:.12g} x {rows:.12g} cells"
+        raise ValueError(f"{cells} are more than {MAX_CELLS}, the most that a map has")

@@ -1,4 +1,4 @@
-"""YAML without its surprises: nodes and their text; no anchors, aliases and tags, and not too many of them."""
+"""YAML without its surprises: its nodes as they stand there, within bounds, and nothing made of them."""
 
 from itertools import accumulate
 
@@ -7,7 +7,7 @@ import yaml
 __all__ = ["plain_nodes"]
 
 DEEPEST = 20
-"""Brackets of a YAML within each other: of thousands PyYAML tries for minutes whether each begins a key."""
+"""Brackets within each other: of thousands PyYAML tries for minutes whether each begins a key."""
 
 
 def plain_nodes(content, most):
@@ -27,11 +27,21 @@ def plain_nodes(content, most):
     Raises
     ------
     ValueError
-        For what is no YAML, has an anchor, an alias or a tag, brackets more than 20 deep within each
-        other, or more nodes.
+        For what is no YAML, has an anchor, an alias or a tag, brackets more than 20 deep within
+        each other, or more nodes.
+
+    Examples
+    --------
+    >>> [node.value for node in plain_nodes(b"0x1F", 1)]
+    ['0x1F']
+    >>> next(plain_nodes(b"!!python/name:os.system", 1))
+    Traceback (most recent call last):
+    ValueError: there must be no anchors, aliases and tags, got one on line 1
     """
     brackets = (1 if byte in b"[{" else -1 for byte in content if byte in b"[{]}")
-    if max(accumulate(brackets, lambda depth, step: max(depth + step, 0)), default=0) > DEEPEST:
+    # Never below zero: what is closed in a comment makes no room for what is opened after it.
+    depths = accumulate(brackets, lambda depth, step: max(depth + step, 0), initial=0)
+    if max(depths) > DEEPEST:
         raise ValueError(f"brackets must be at most {DEEPEST} deep within each other")
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     count = 0
@@ -42,7 +52,8 @@ def plain_nodes(content, most):
                 raise ValueError(f"holds more than {most} nodes, the most that is read")
             if getattr(event, "anchor", None) or getattr(event, "tag", None):
                 line = event.start_mark.line + 1
-                raise ValueError(f"there must be no anchors, aliases and tags, got one on line {line}")
+                rule = "there must be no anchors, aliases and tags"
+                raise ValueError(f"{rule}, got one on line {line}")
             if isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent):
                 yield event
     except yaml.YAMLError as error:

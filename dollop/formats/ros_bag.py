@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from dollop.checks import checked_array, need
-from dollop.formats.bag_bounds import bound_chunks, check_bag
 from dollop.formats.files import FormatError, check_cells, from_file
 from dollop.formats.odometry import Odometry
+from dollop.formats.ros_bag_bounds import bound_chunks, check_bag
 from dollop.formats.ros_frames import Link, laser_poses, planar
 from dollop.formats.scans import (
     MAX_READINGS,
@@ -83,7 +83,7 @@ def read_log(path, topic=None):
     FormatError
         If the file is no bag, holds no such topic or several to choose from, more than a few scans
         are broken, or one has beams or ranges that no laser has; or if there are more than 100
-        million readings, or what `dollop.formats.bag_bounds` refuses.
+        million readings, or what `dollop.formats.ros_bag_bounds` refuses.
 
     Warns
     -----
@@ -207,7 +207,8 @@ def _opened(path):
     except FormatError:
         raise
     except Exception as error:
-        raise FormatError(f"not a readable ROS bag ({str(error) or type(error).__name__})", path) from None
+        reason = str(error) or type(error).__name__
+        raise FormatError(f"not a readable ROS bag ({reason})", path) from None
 
 
 def _messages(path, bag, kind, topic):
@@ -247,9 +248,11 @@ def _scans(path, messages):
 
 def _scan(message):
     """A message as a scan, what is no measurement as `inf`."""
-    ranges = np.array(message.ranges, dtype=float)
+    with np.errstate(invalid="ignore"):  # a NaN that signals is no measurement either
+        ranges = np.array(message.ranges, dtype=float)
     measured = (ranges >= message.range_min) & (ranges <= message.range_max)
-    beams = Beams(ranges.size, message.angle_min, message.angle_increment, message.range_max)
+    start, step, reach = map(float, (message.angle_min, message.angle_increment, message.range_max))
+    beams = Beams(ranges.size, start, step, reach)
     check_beams(beams)
     check_metres("a range", np.where(measured & np.isfinite(ranges), ranges, 0))
     return Scan(beams, np.where(measured, ranges, np.inf), (0, 0, 0), _seconds(message.header.stamp))

@@ -52,7 +52,7 @@ MAX_YAML, MAX_NODES = 1 << 16, 1000
 """Bytes and nodes of the YAML, which holds seven keys, and perhaps others that are passed over."""
 
 MAX_PICTURE, MAX_HEAD = 1 << 27, 1 << 12
-"""Bytes of the picture, and of a PGM's head up to its size: the most cells in text, and some comments."""
+"""Bytes of the picture, the most cells in text, and of a PGM's head up to its size."""
 
 PNG, PNM_SIZE = (
     b"\x89PNG\r\n\x1a\n",
@@ -142,8 +142,8 @@ def read_map(path):
     Parameters
     ----------
     path : str or Path
-        The YAML, of at most 64 KiB and 1000 nodes, without anchors, aliases and tags; its picture is
-        a PGM or a PNG of at most 128 MiB and 25 million pixels.
+        The YAML, of at most 64 KiB and 1000 nodes, without anchors, aliases and tags; its picture
+        is a PGM or a PNG of at most 128 MiB and 25 million pixels.
 
     Returns
     -------
@@ -162,16 +162,18 @@ def read_map(path):
     """
     keys = USUAL | _read_keys(path)
     written = keys.get("origin")
-    origin = [_number(path, "origin", each) for each in written] if isinstance(written, list) else []
+    numbers = written if isinstance(written, list) else []
+    origin = [_number(path, "origin", each) for each in numbers]
     if len(origin) != 3 or not abs(origin[2]) <= RIGHT_ANGLED:
-        raise FormatError(f"origin must be [x, y, 0] (a turned map is not supported), got {told(written)}", path)
+        rule = "origin must be [x, y, 0] (a turned map is not supported)"
+        raise FormatError(f"{rule}, got {told(written)}", path)
     resolution = _number(path, "resolution", keys.get("resolution"))
     grey = _read_grey(path, keys.get("image"), PAIR.search(read_bytes(path, MAX_YAML)))[::-1]
     return _probabilities(path, keys, grey), origin[:2], resolution
 
 
 def _read_keys(path):
-    """The keys of a YAML: each a text as it stands there, a list of such, or None if it is something else.
+    """The keys of a YAML: each a text as it stands there, a list of such, or None for what else it is.
 
     No object is made of it but these.
     """
@@ -187,7 +189,8 @@ def _keys_of(content):
             break
         name, value = _value(key, nodes), _value(next(nodes), nodes)
         if not isinstance(name, str) or name in found or name == "<<":
-            raise ValueError(f"a key must be a text, given once, got {told(name)} on line {key.start_mark.line + 1}")
+            place = f"{told(name)} on line {key.start_mark.line + 1}"
+            raise ValueError(f"a key must be a text, given once, got {place}")
         found[name] = value
     if any(isinstance(event, yaml.NodeEvent) for event in nodes):
         raise ValueError("expected one document, got another after it")
@@ -195,13 +198,14 @@ def _keys_of(content):
 
 
 def _value(event, nodes):
-    """The node that begins with an event: its text, a list of texts, or None; it is gone through to its end."""
+    """The node that begins with an event, gone through to its end: a text, a list of texts, or None."""
     if isinstance(event, yaml.ScalarEvent):
         return event.value
     parts, depth = [], 1
     while depth:
         inner = next(nodes)
-        depth += isinstance(inner, yaml.CollectionStartEvent) - isinstance(inner, yaml.CollectionEndEvent)
+        depth += isinstance(inner, yaml.CollectionStartEvent)
+        depth -= isinstance(inner, yaml.CollectionEndEvent)
         parts.append(getattr(inner, "value", None))
     return parts[:-1] if isinstance(event, yaml.SequenceStartEvent) else None
 
@@ -220,7 +224,7 @@ def _read_grey(path, name, mark):
     if not isinstance(name, str):
         raise FormatError(f"image must be the name of its picture, got {told(name)}", path)
     # os.path and not pathlib, for which a name too long or with a zero byte is another error.
-    folders = map(os.path.dirname, (path, os.path.realpath(path)))  # if the YAML is a link, beside either
+    folders = map(os.path.dirname, (path, os.path.realpath(path)))  # of a link beside either
     place = next(filter(os.path.exists, (os.path.join(folder, name) for folder in folders)), None)
     if place is None:
         raise FormatError(f"its picture {told(name, 150)} is missing", path)
@@ -229,8 +233,9 @@ def _read_grey(path, name, mark):
     from_file(place, check_cells, *size)
     other = PAIR.search(content[:MAX_HEAD]) if kind is PpmImagePlugin.PpmImageFile else None
     if mark and other and mark[1] != other[1]:
-        rule = f"it is of pair {other[1].decode()}, and {os.path.basename(path)} of pair {mark[1].decode()}"
-        raise FormatError(f"is one half of another run: {rule}", place)
+        own = f"{os.path.basename(path)} of pair {mark[1].decode()}"
+        found = f"it is of pair {other[1].decode()}, and {own}"
+        raise FormatError(f"is one half of another run: {found}", place)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # what Pillow would warn of is no map
@@ -240,12 +245,13 @@ def _read_grey(path, name, mark):
 
 
 def _kind_and_size(place, content):
-    """The reader of a PGM or PNG, and its columns and rows by its first bytes: nothing else is tried."""
+    """The reader of a PGM or PNG, and its columns and rows, by its first bytes."""
     if content.startswith(PNG) and len(content) >= 24:
         return PngImagePlugin.PngImageFile, struct.unpack(">II", content[16:24])
     head = PNM_SIZE.match(content[:MAX_HEAD])
     if head is None:
-        raise FormatError(f"not a readable picture (neither PNG nor PGM with its size in {MAX_HEAD} bytes)", place)
+        rule = f"neither PNG nor PGM with its size in {MAX_HEAD} bytes"
+        raise FormatError(f"not a readable picture ({rule})", place)
     return PpmImagePlugin.PpmImageFile, (float(head[1]), float(head[2]))
 
 
@@ -290,7 +296,8 @@ def _probabilities(path, keys, grey):
 
 def _negate(path, value):
     """Whether dark is free: what `negate` says."""
-    text = value if isinstance(value, str) and value in (value.lower(), value.upper(), value.capitalize()) else ""
-    if text.lower() not in NEGATE:
-        raise FormatError(f"negate must be one of {', '.join(NEGATE)}, got {told(value)}", path)
-    return NEGATE[text.lower()]
+    for letters in (str.lower, str.upper, str.capitalize):
+        words = {letters(word): meaning for word, meaning in NEGATE.items()}
+        if isinstance(value, str) and value in words:
+            return words[value]
+    raise FormatError(f"negate must be one of {', '.join(NEGATE)}, got {told(value)}", path)

@@ -41,8 +41,8 @@ WIDE = np.radians(30)
 """Bearings in rad that a pile must spread over: the end of a corridor may be read alike often, but it is
 narrow."""
 MAX_BEAMS, MAX_READINGS = 36_000, 100_000_000
-"""Beams of a scan, a hundredth of a degree apart all round, and readings of a log: ten hours of ten scans of
-271 beams a second, for which a gigabyte is needed."""
+"""Beams of a scan, a hundredth of a degree apart all round, and readings of a log: ten hours of ten
+scans of 271 beams a second, for which a gigabyte is needed."""
 FULL_TURN = 2 * np.pi + 1e-6
 """rad that beams may spread over, and what rounding adds."""
 
@@ -109,8 +109,8 @@ def check_beams(beams):
     Raises
     ------
     ValueError
-        If they are more than 36,000 or none, spread over more than a full turn or over nothing, or begin
-        farther than a full turn from straight ahead.
+        If they are more than 36,000 or none, spread over more than a full turn or over nothing, or
+        begin farther than a full turn from straight ahead.
     """
     if not 1 <= beams.count <= MAX_BEAMS:
         raise ValueError(f"a scan must have 1 to {MAX_BEAMS} beams, got {told(beams.count)}")

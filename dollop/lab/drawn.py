@@ -16,6 +16,8 @@ TASKS = {
     "ring": tuple((2 * np.cos(a), 2 * np.sin(a)) for a in np.arange(6) * np.pi / 3),
 }
 """The true subgoals of each task in m, six each."""
+DRAWS = 10_000
+"""Times that objects are drawn to stand apart."""
 
 
 def draw_demonstrations(task, n, spread, extra=0.3, seed=0):
@@ -84,6 +86,11 @@ def random_layouts(objects, generator, noise=0.05, moved=0.4, room=6.0, size=0.4
         In random order.
     partners : (objects,) int array
         Which object of `after` each object of `before` is, -1 where it is missing.
+
+    Raises
+    ------
+    ValueError
+        If 10,000 draws do not find room for the objects.
     """
     arrivals, departures = _CHANGES[change]
     total = objects + arrivals
@@ -99,11 +106,13 @@ def random_layouts(objects, generator, noise=0.05, moved=0.4, room=6.0, size=0.4
 
 def _apart(draw, distance):
     """Positions (N, 2), drawn anew until no two are nearer than `distance` in both x and y."""
-    while True:
+    for _ in range(DRAWS):
         positions = draw()
         distances = np.abs(positions - positions[:, None]).max(axis=2)
         if (distances + distance * np.eye(len(positions))).min() >= distance:
             return positions
+    rule = f"objects must find places {distance:g} m apart within {DRAWS} draws"
+    raise ValueError(f"{rule}, got none for {len(positions)}: the room is too small")
 
 
 def _turned(positions, turn):

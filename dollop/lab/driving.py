@@ -3,6 +3,7 @@
 import numpy as np
 
 from dollop.pose import moved_pose, wrapped
+from dollop.sequenced_lds import check_times
 
 __all__ = ["ARRIVED", "planned_poses", "pursue"]
 
@@ -49,12 +50,18 @@ def planned_poses(robot, t):
     (N, 3) float array
         x, y in m, theta in rad.
 
+    Raises
+    ------
+    ValueError
+        If it takes more than a million steps of 0.05 s.
+
     Examples
     --------
     >>> from dollop.lab.things import Robot
     >>> planned_poses(Robot((0.0, 0.0, 0.0), way=[(1.3, 0.0)], speed=0.5), [0.0, 1.0, 9.0]).round(2).tolist()
     [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [1.0, 0.0, 0.0]]
     """
+    check_times(t[-1], STEP)
     goals, pose, poses = list(robot.way), np.array(robot.pose), []
     for _ in np.arange(0.0, t[-1] + STEP, STEP):
         poses.append(pose)

@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from dollop.checks import check_choice, checked_number, checked_positions
 from dollop.lab.outlines import nearest_core, outline_distances
+from dollop.sequenced_lds import check_times
 from dollop.trajectory import arc_length, resample
 
 __all__ = [
@@ -308,7 +309,13 @@ def walk_along(t, positions, body="torso"):
     Returns
     -------
     Walk
+
+    Raises
+    ------
+    ValueError
+        If it lasts longer than a million steps of 0.02 s, as where a clock has jumped.
     """
+    check_times(t[-1], TIME_STEP)
     times = np.arange(0.0, t[-1] + TIME_STEP / 2, TIME_STEP)
     way = np.column_stack([np.interp(times, t, axis) for axis in positions.T])
     distance = arc_length(way)
@@ -452,6 +459,7 @@ def travelled(speeds, pauses, stand):
     going_on = [(times[index] + seconds, index) for index, seconds in rests]
     times, steps = np.concatenate([[times, steps], np.transpose(going_on)], axis=1)
     order = times.argsort(kind="stable")
+    check_times(times.max() + stand, TIME_STEP)
     t = np.arange(0.0, times.max() + stand, TIME_STEP)
     distance = np.interp(t, times[order], steps[order] * PATH_STEP)
     return gaussian_filter1d(distance, 0.15 / TIME_STEP, mode="nearest")

@@ -89,14 +89,15 @@ class Recording:
         Raises
         ------
         FormatError
-            If a file is missing or not what it should be, or the truth is larger than 64 MiB or has not
-            one line for each scan.
+            If a file is missing or not what it should be, or the truth is larger than 64 MiB or has
+            not one line for each scan.
         """
         log = read_log(path)
         truth_path, scene_path = companions(path)
         for each in (truth_path, scene_path):
             if not each.exists():
-                raise FormatError("a recording has its truth and its scene beside its log, this is missing", each)
+                rule = "a recording has its truth and its scene beside its log"
+                raise FormatError(f"{rule}, this is missing", each)
         return cls(log, load_truth(truth_path, len(log)), Scene.load(scene_path))
 
 
@@ -123,9 +124,12 @@ def load_truth(path, n_scans):
     names = names.split(",")
     kinds = {re.sub(r"_\d+$", "", name) for name in names}
     known = {*TRUTH_COLUMNS, *MOVED_COLUMNS, *ROBOT_COLUMNS}
-    if "t" not in names or not kinds <= known or len(set(names)) < len(names) or len(lines) not in (0, n_scans):
-        rule = f"columns must be t and of {', '.join(sorted(known - {'t'}))}, and rows {n_scans}, one for each scan"
-        raise FormatError(f"{rule}, or none if nothing moves, got {', '.join(names)} and {len(lines)}", path)
+    good = "t" in names and kinds <= known and len(set(names)) == len(names)
+    if not good or len(lines) not in (0, n_scans):
+        others = ", ".join(sorted(known - {"t"}))
+        rule = f"columns must be t and of {others}, and rows {n_scans}, one for each scan"
+        found = f"{', '.join(names)} and {len(lines)}"
+        raise FormatError(f"{rule}, or none if nothing moves, got {found}", path)
     rows = [_row(path, names, line, number) for number, line in enumerate(lines, 2)]
     return pd.DataFrame(np.reshape(rows, (-1, len(names))).astype(float), columns=names)
 
@@ -137,7 +141,8 @@ def _row(path, names, line, number):
         rule = f"not a table of numbers: a line must hold one for each of {len(names)} columns"
         raise FormatError(f"{rule}, got {len(values)}", path, number)
     try:
-        return [written_number(name, value.strip(), LARGEST) for name, value in zip(names, values, strict=True)]
+        pairs = zip(names, values, strict=True)
+        return [written_number(name, value.strip(), LARGEST) for name, value in pairs]
     except ValueError as error:
         raise FormatError(f"not a table of numbers: {error}", path, number) from None
 

@@ -32,7 +32,7 @@ __all__ = [
 
 FORMAT, VERSION = "dollop scene", 1
 MOST = 1000
-"""Objects, people, moves and parts of furniture in a file: each is set against each of the others."""
+"""Objects, people, moves and parts of furniture in a file: each is set against each other."""
 LONGEST_WAY = 1000.0
 """m that a robot drives at most: an hour at its usual speed."""
 
@@ -289,7 +289,7 @@ def check_robot(scene):
     if robot.beam_height >= scene.room.height:
         rule = f"the beam must be below the top of the walls, {scene.room.height} m"
         raise ValueError(f"{rule}, got {robot.beam_height} m")
-    longest = np.hypot(*np.ptp(scene.room.corners, axis=0))  # what is longer leaves the room, however closely looked at
+    longest = np.hypot(*np.ptp(scene.room.corners, axis=0))  # what is longer leaves the room
     lengths = [min(np.hypot(*np.subtract(b, a)), longest) for a, b in robot_lines(robot)]
     if sum(lengths) > LONGEST_WAY:
         raise ValueError(f"the robot's way must be at most {LONGEST_WAY:g} m long, got {sum(lengths):g} m")

@@ -4,7 +4,7 @@ from itertools import chain
 
 import numpy as np
 
-from dollop.checks import Note, checked_record, checked_records
+from dollop.checks import Note, checked_record, checked_records, shortened
 from dollop.environment import Environment
 from dollop.matching import Matching, match_surely
 
@@ -155,7 +155,7 @@ def matchings_into(environment, demonstrations, given=None):
         found.append(each)
         notes += told
     if len(refused) == len(found):
-        raise ValueError("no demonstration can be learned from: " + "; ".join(refused))
+        raise ValueError("no demonstration can be learned from: " + shortened("; ".join(refused), 250))
     return found, notes
 
 

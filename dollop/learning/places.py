@@ -39,8 +39,8 @@ CELL = 0.05
 BETWEEN, MIXED = (0.25, 0.5, 0.75), 1 / 3
 """Places between two objects that are candidates, and how likely each is beside one object alone."""
 MOST_PAIRS = 500
-"""Pairs of objects between which a place may lie. Candidates are compared with each other, which takes
-time with the square of the pairs: of 32 objects some seconds."""
+"""Pairs of objects between which a place may lie. Candidates are compared with each other, which
+takes time with the square of the pairs: of 32 objects some seconds."""
 STAY, STEP, JUMP = 0.5, 0.25, 0.02
 """Of the chain: what the next place follows is the same, a neighbour between the same two objects, or anything."""
 SIGMA, TAU, LEAST = 0.3, 0.1, 0.03
@@ -147,7 +147,8 @@ def tied_places(points, valid, frames, chained=True):
     Places
     """
     apart = told_apart(frames)
-    weights = candidates(frames, apart, [walk[each] for walk, each in zip(points, valid, strict=True)])
+    shown = [walk[each] for walk, each in zip(points, valid, strict=True)]
+    weights = candidates(frames, apart, shown)
     local, error, counted = seen_from(points, valid, frames)
     logarithms = log_prior(weights, points, valid, local, frames)
     if apart:

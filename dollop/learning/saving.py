@@ -36,7 +36,7 @@ FORMAT, VERSION = "dollop task", 2
 SAME = 1e-6
 """m: places that two numbers of a file give must agree to this, or to this share of how far they are from 0."""
 MOST, MAX_SAMPLES, MAX_TEXT = 1000, 20_000, 10_000
-"""Of each list of things, samples of a walk (half an hour of ten a second), and characters of a note."""
+"""Of each list, samples of a walk (half an hour of ten a second), and characters of a note."""
 ALWAYS = "format", "version", "demonstrations"
 LAW = "start", "speeds", "segments", "association"
 TASK = *ALWAYS, "method", "environment", "objects", "partners", "notes"
@@ -142,10 +142,11 @@ def read_task(path, make_task, make_demonstration, laid_out):
     ------
     FormatError
         For a file that is damaged, not a task, of another version, or whose numbers contradict each
-        other; and beyond the bounds of `dollop.formats.files.read_json`, 1000 of a list of things and
-        20,000 samples of a walk.
+        other; and beyond the bounds of `dollop.formats.files.read_json`, 1000 of a list and 20,000
+        samples of a walk.
     """
-    return from_file(path, _task_of, read_json(path, "a task"), make_task, make_demonstration, laid_out)
+    content = read_json(path, "a task")
+    return from_file(path, _task_of, content, make_task, make_demonstration, laid_out)
 
 
 def _task_of(content, make_task, make_demonstration, laid_out):
@@ -157,7 +158,8 @@ def _task_of(content, make_task, make_demonstration, laid_out):
     if version == 1:
         content = _as_version_2(content)
     check_choice("method", content.get("method"), ("anchored", "paper"))
-    check_fields("a task", content, (*TASK, *(["ways"] if content["method"] == "anchored" else LAW)))
+    further = ["ways"] if content["method"] == "anchored" else LAW
+    check_fields("a task", content, (*TASK, *further))
     each_shown = _all("demonstrations", content["demonstrations"], _demonstration_from)
     shown = tuple(make_demonstration(**each) for each in each_shown)
     return _task_from(content, shown, make_task, laid_out)
@@ -185,7 +187,8 @@ def _as_version_2(content):
     check_fields("a task of version 1", content, (*ALWAYS, *LAW, "boxes"))
     shown = _all("demonstrations", content["demonstrations"], _shown_in_version_1)
     empty = {"method": "paper", "notes": [], "partners": [], "objects": None}
-    content = content | empty | {"environment": {"boxes": content["boxes"]}, "demonstrations": list(shown)}
+    environment = {"boxes": content["boxes"]}
+    content = content | empty | {"environment": environment, "demonstrations": list(shown)}
     return {name: value for name, value in content.items() if name != "boxes"}
 
 
@@ -223,7 +226,7 @@ def _law_from(content):
 
 
 def _segment_from(content):
-    check_fields("a segment", content, ("goal", "G0", "G1"), optional=["A"])  # A: of the first version 1
+    check_fields("a segment", content, ("goal", "G0", "G1"), ["A"])  # A: of the first version 1
     return LDS(
         Statistics(*(checked_array(name, content[name], 2, 2) for name in ("G0", "G1"))),
         content["goal"],
@@ -247,7 +250,8 @@ def _association_from(content, environment, places):
 
 def _way_from(content, count):
     check_fields("a way", content, WAY)
-    weights = checked_array("weights", content["weights"], PLACES, "F", least=-1, most=2)  # smooth ones overshoot
+    # Smooth weights go a little beyond 0 and 1.
+    weights = checked_array("weights", content["weights"], PLACES, "F", least=-1, most=2)
     if np.abs(weights.sum(axis=1) - 1).max() > SAME:
         raise ValueError("the weights of each place must sum to 1")
     frames, walks = weights.shape[1], _walks_from(content["walks"])
@@ -278,12 +282,14 @@ def _walks_from(content):
 
 def _shares_from(content, walks):
     """Where along the places each sample of each walk is."""
-    shares = _all("shares", content, lambda each: checked_array("shares", each, "N", least=0, most=PLACES - 1))
+    bounds = {"least": 0, "most": PLACES - 1}
+    shares = _all("shares", content, lambda each: checked_array("shares", each, "N", **bounds))
     if [len(each) for each in shares] != [len(each) for each in walks]:
         raise ValueError(f"shares must be one for each sample of {len(walks)} walks")
     for share in shares:
         if (np.diff(share) < 0).any():
-            raise ValueError(f"shares must rise from 0 to {PLACES - 1}, got a fall by {-np.diff(share).min():g}")
+            fall = -np.diff(share).min()
+            raise ValueError(f"shares must rise from 0 to {PLACES - 1}, got a fall by {fall:g}")
     return shares
 
 
@@ -332,7 +338,8 @@ def _environment_from(content):
 def _seen_from(content):
     check_fields("what was seen", content, ("floor", "origin", "resolution"))
     rows = content["floor"]
-    if not (isinstance(rows, list) and rows and all(isinstance(row, str) and not row.strip("01") for row in rows)):
+    good = isinstance(rows, list) and rows and all(isinstance(row, str) for row in rows)
+    if not good or any(row.strip("01") for row in rows):
         raise ValueError(f"the floor must be rows of 0 and 1, got {told(rows)}")
     if len(set(map(len, rows))) > 1 or not rows[0]:
         raise ValueError("the rows of what was seen must be of one length, and not empty")

@@ -11,15 +11,27 @@ from functools import cached_property
 import numpy as np
 import scipy
 
+from dollop.checks import (
+    FARTHEST,
+    checked_array,
+    checked_flags,
+    checked_number,
+    checked_positions,
+    checked_records,
+    checked_wholes,
+    put_in,
+)
 from dollop.learning.frames import frames_like
 from dollop.learning.places import Places
 from dollop.learning.ways import PLACES
 from dollop.pose import rotation
-from dollop.sequenced_lds import SequencedLDS, check_times
-from dollop.trajectory import align, arc_length, resample
+from dollop.sequenced_lds import LEAST_REACH, PERIODS, SequencedLDS, check_times
+from dollop.trajectory import align, arc_length, check_trajectory, resample
 
 __all__ = ["Way", "curve_of", "way_of", "which_places"]
 
+MOST_WEIGHT = 1e6
+"""Of a place by an object, of either sign: the weights of a place sum to 1."""
 LOOSER = 4
 """Times that the tolerance of a law is doubled where objects bend its way too sharply."""
 SLOWER, FASTER = 0.2, 5.0
@@ -51,6 +63,11 @@ class Way:
         Of the walks, in s.
     tolerance : float
         Largest mean error of a segment of the law in m.
+
+    Raises
+    ------
+    ValueError
+        Numbers of places, frames or members that contradict each other, or what is no such number.
     """
 
     walks: tuple
@@ -64,6 +81,31 @@ class Way:
     covered: tuple
     sample_period: float
     tolerance: float
+
+    def __post_init__(self):
+        walks = tuple(map(check_trajectory, checked_records("walks", self.walks, object)))
+        shares = checked_records("shares", self.shares, object)
+        if not walks or len(shares) != len(walks):
+            raise ValueError(f"a way needs a share for each of its walks, got {len(shares)}")
+        home = checked_positions("home", self.home)
+        pairs = zip(shares, walks, strict=True)
+        shares = tuple(checked_array("shares", each, len(walk), least=0, most=len(home) - 1) for each, walk in pairs)
+        for each in (*walks, *shares):
+            each.flags.writeable = False
+        weights = checked_array("weights", self.weights, len(home), "F", least=-MOST_WEIGHT, most=MOST_WEIGHT)
+        local = checked_array("local", self.local, *weights.shape, 2, least=-2 * FARTHEST, most=2 * FARTHEST)
+        frames = weights.shape[1]
+        put_in(self, walks=walks, shares=shares, home=home, weights=weights, local=local)
+        put_in(
+            self,
+            objects=checked_wholes("objects", self.objects, frames, least=-1),
+            turning=checked_flags("turning", self.turning, frames),
+            members=tuple(checked_wholes("members", self.members, "K").tolist()),
+            sample_period=checked_number("sample_period", self.sample_period, *PERIODS),
+            tolerance=checked_number("tolerance", self.tolerance, LEAST_REACH),
+        )
+        covered = checked_array("covered", self.covered, len(self.members), 2)
+        put_in(self, covered=tuple(map(tuple, covered.tolist())))
 
     def __repr__(self):
         return f"Way of {len(self.home)} places, shown {len(self.members)} x"

@@ -10,6 +10,8 @@ from dollop.trajectory import distance_to_polyline
 
 __all__ = ["distances_to_law", "free_poses", "return_times"]
 
+DRAWS = 10_000
+"""Places that are drawn for each pose, at most."""
 HELD = 1.0
 """Time in s for which a kidnapped robot must keep near the response to count as back on it."""
 
@@ -33,13 +35,21 @@ def free_poses(count, obstacles, goal, seed, room=0.05):
     -------
     (count, 3) float array
         x, y in m, theta in rad.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than one such pose in 10,000 draws.
     """
     rng, reachable = np.random.default_rng(seed), Geodesic(obstacles, goal)
     low = np.append(obstacles.origin, -np.pi)
     size = obstacles.resolution * np.array(obstacles.distances.shape[::-1])
     high = np.append(low[:2] + size, np.pi)
-    poses = []
+    poses, tried = [], 0
     while len(poses) < count:
+        tried += 1
+        if tried > DRAWS * count:
+            raise ValueError(f"the map must have room for a robot, got none in {DRAWS} draws a pose")
         x, y, theta = rng.uniform(low, high)
         if obstacles.edge(x, y) > room and isfinite(reachable.distance(x, y)):
             poses.append((x, y, theta))

@@ -1,13 +1,16 @@
 """The study behind REPLICATION.md: every claim over many seeds, on all cores or a Dask cluster.
 
-Results go into one tidy table, study/results.csv: a row per claim, seed and number. It is replaced
-whole after every seed that is done, so that an interrupted study goes on where it was. From the
-table come claims.json, and with it the table of claims in REPLICATION.md; and study/golden.json,
-the numbers of one seed that any machine must find again.
+Results go into one table, study/results.csv: a line per claim and seed, with its numbers, the
+fingerprints of the code and of the criteria that made them, and a checksum. It is added to whenever
+an experiment is done, by as many studies at a time as there are, and an interrupted study goes on
+where it was. From the table come claims.json, and with it the table of claims in REPLICATION.md; and
+study/golden.json, the numbers of one seed that any machine must find again.
 """
 
+import sys
 from functools import partial
-from math import isfinite, nan
+from itertools import chain
+from math import isfinite, isinf, nan
 from pathlib import Path
 
 import numpy as np
@@ -15,17 +18,33 @@ import pandas as pd
 from scipy import stats
 
 from dollop.checks import need
-from dollop.formats.files import FormatError
-from dollop.formats.writing import check_writable, whole_file
+from dollop.formats.files import warn_of
+from dollop.formats.kinds import Kind
+from dollop.formats.writing import check_writable, together, whole_file
 from dollop.replication.claims import CLAIMS
 from dollop.replication.claims.observing import choose_noises
-from dollop.replication.running import as_json, going_on_in, put_between_marks, report_beside, run_all
+from dollop.replication.fingerprint import fingerprint, fingerprint_of_text
+from dollop.replication.ledger import NOT_DONE, Ledger
+from dollop.replication.running import (
+    REPORT,
+    as_json,
+    going_on_in,
+    put_between_marks,
+    report_beside,
+    run_all,
+)
 from dollop.replication.worlds.survey import command as survey_worlds
 
 __all__ = ["command"]
 
 COLUMNS = ["claim", "seed", "number", "value"]
+"""Of the table in memory: a row for each number."""
+LINE = ("claim", "seed", "numbers", "code", "criteria")
+"""Columns of the file; its lines hold all numbers of a claim and a seed, as name=value."""
 SEEDS, QUICK_SEEDS = 100, 3
+
+VERDICTS = Kind("verdicts of claims", rb'\A\[\s*(\]|\{\s*"id":)')
+NUMBERS = Kind("golden numbers", rb'\A\{\s*"parameters":')
 
 GOLDEN = {"seed": 0, "tolerance": 0.01}
 """The seed whose numbers any machine must find again, and within what: a share of a number's
@@ -38,39 +57,36 @@ drawn anew is far above it, for fewer than one in a hundred would come that near
 # ---- running
 
 
-def work(seed, ids, claims=CLAIMS):
-    """The experiments of some claims for one seed.
+def work(job, claims=CLAIMS):
+    """The experiment of one claim for one seed.
 
     Parameters
     ----------
-    seed : int
-    ids : sequence of str
-        Of claims.
+    job : (str, str)
+        Claim and seed.
     claims : dict of Claim, optional
         The paper's by default.
 
     Returns
     -------
-    seed : int
-    rows : list of (str, int, str, float)
-        As in the table.
-    failures : list of str
-        What went wrong, by claim; the others go on.
+    dict of str
+        "numbers", as the table has them.
     """
-    rows, failures = [], []
-    for id in ids:
-        try:
-            found = claims[id].experiment(seed)
-        except Exception as error:  # whatever it is, the other claims' results are not lost
-            failures.append(f"claim {id}, seed {seed}: {type(error).__name__}: {error}")
-            continue
-        numbers = [each.number for each in claims[id].criteria]
-        rows += [(id, seed, number, float(f"{found[number]:.6g}")) for number in numbers]
-    return seed, rows, failures
+    id, seed = job
+    found = claims[id].experiment(int(seed))
+    numbers = {each.number: float(found[each.number]) for each in claims[id].criteria}
+    for name, value in numbers.items():
+        if isinf(value):
+            raise ValueError(f"{name} must be finite or nan, got {value}")
+    return {"numbers": " ".join(f"{name}={value:.6g}" for name, value in numbers.items())}
 
 
 def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
-    """Fill the table with what is missing in it, seed by seed.
+    """Fill the table with what is missing in it, claim by claim of a seed.
+
+    Numbers count that code of today has made, which has the same fingerprint; others are made anew.
+    They count as well if a criterion has been changed since, as long as all those are there that are
+    asked for: then that is said, for a criterion should stand before the numbers that judge it.
 
     Parameters
     ----------
@@ -84,42 +100,77 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
     claims : dict of Claim, optional
         The paper's by default.
     jobs : int
-        Number of worker processes on this machine, -1 for one per core.
+        Number of worker processes on this machine, -1 for one per core, 0 for none but this.
 
     Returns
     -------
     pandas.DataFrame
-        The table.
+        The table, a row for each claim, seed and number.
 
     Raises
     ------
     RuntimeError
-        If experiments failed, or workers kept dying; all that was finished is in the table.
+        If experiments failed or killed their workers, which are named; or if workers died whatever
+        they were at. All that was finished is in the table.
+    FormatError
+        If the file is something else.
     """
-    table, failures = read_table(table_path), []
+    stamps = {id: stamp(claim) for id, claim in claims.items()}
 
-    def keep(found):
-        nonlocal table
-        _, rows, failed = found
-        table = pd.concat([table, as_table(rows)]).drop_duplicates(COLUMNS[:3], keep="last")
-        write_table(table, table_path)
-        failures.extend(failed)
+    def answers(row):
+        made = stamps.get(row["claim"], {}).get("code") == row["code"]
+        return made and {each.number for each in claims[row["claim"]].criteria} <= set(numbers_of(row))
 
-    run_all(missing(table, claims, ids, seeds), partial(work, claims=claims), keep, scheduler, jobs)
-    if failures:
-        raise RuntimeError(f"{len(failures)} experiments failed: {'; '.join(failures)}")
-    return table
+    asked = [(id, str(seed)) for seed in seeds for id in ids]
+    rows = run_all(
+        ledger_at(table_path),
+        asked,
+        answers,
+        lambda job: stamps[job[0]],
+        partial(work, claims=claims),
+        scheduler,
+        jobs,
+    )
+    old = {row["claim"] for row in rows if answers(row) and row["criteria"] != stamps[row["claim"]]["criteria"]}
+    if old:
+        told = "numbers are older than the criteria that judge them now"
+        print(f"{told}, and are kept: {', '.join(sorted(old))}", file=sys.stderr)
+    return as_table(chain.from_iterable(map(expanded, rows)))
 
 
-def missing(table, claims, ids, seeds):
-    """The claims that a seed still lacks a number of, {seed: list of ids}, in the order given."""
-    done = set(zip(table.claim, table.seed, table.number, strict=True))
-    todo = {}
-    for seed in seeds:
-        for id in ids:
-            if any((id, seed, each.number) not in done for each in claims[id].criteria):
-                todo.setdefault(seed, []).append(id)
-    return todo
+def stamp(claim):
+    """The fingerprints of the code and of the criteria that make a claim's numbers."""
+    criteria = ((each.number, each.wanted, each.trials, each.timed) for each in claim.criteria)
+    return {
+        "code": fingerprint(claim.experiment.__module__),
+        "criteria": fingerprint_of_text(*map(repr, criteria)),
+    }
+
+
+def ledger_at(path):
+    """The table of results at a path, as it is in the file."""
+    return Ledger(path, LINE, keys=2, why="numbers", sound=is_sound)
+
+
+def is_sound(row):
+    """Whether a line's numbers can be read."""
+    try:
+        return not any(map(isinf, numbers_of(row).values()))
+    except ValueError:
+        return False
+
+
+def numbers_of(row):
+    """A line's numbers, {name: value}; none if its job was set aside."""
+    if row["numbers"].startswith(NOT_DONE):
+        return {}
+    pairs = (pair.split("=") for pair in row["numbers"].split())
+    return {name: float(value) for name, value in pairs}
+
+
+def expanded(row):
+    """The table's rows that a line stands for."""
+    return [(row["claim"], row["seed"], number, value) for number, value in numbers_of(row).items()]
 
 
 def as_table(rows=()):
@@ -130,26 +181,18 @@ def as_table(rows=()):
 def read_table(path):
     """The table at a path, an empty one if there is none.
 
+    Lines that are damaged are left out, with a warning; of each claim and seed the last counts.
+
     Raises
     ------
     FormatError
         If the file is something else.
     """
-    if not path.exists():
-        return as_table()
-    try:
-        table = pd.read_csv(path).astype({"seed": int, "value": float})
-    except (KeyError, ValueError) as error:
-        raise FormatError(f"not a table of results: {error}", path) from error
-    if list(table.columns) != COLUMNS:
-        raise FormatError(f"columns must be {COLUMNS}, got {list(table.columns)}", path)
-    return table
-
-
-def write_table(table, path):
-    """Write the table in order, whole or not at all."""
-    with whole_file(path, "w") as stream:
-        table.sort_values(["claim", "seed"], kind="stable").to_csv(stream, index=False)
+    ledger = ledger_at(path)
+    rows, damaged = ledger.read()
+    if damaged:
+        warn_of(path, f"{damaged} lines are damaged and left out")
+    return as_table(chain.from_iterable(map(expanded, ledger.latest(rows, numbers_of))))
 
 
 # ---- summing up
@@ -349,16 +392,23 @@ def command(options):
 def publish(table, folder):
     """Write claims.json into the folder; beside REPLICATION.md if the study is the one told there.
 
-    Its table of claims and the golden numbers are then written as well.
+    Its table of claims and the golden numbers are then written as well: all of them, or none. The
+    report, which people wrote, comes last, so that it is there at any time.
     """
     found, report = summaries(table), report_beside(folder)
     for claim in found:
         print(f"{claim['id']:17}{claim['verdict']:15}{claim['seeds']:4} seeds")
-    written = {(folder.parent if report else folder) / "claims.json": as_json(found)}
-    if report:
-        written[report] = put_between_marks(report.read_text(), "claims", claims_table(found))
-        written[folder / "golden.json"] = as_json(golden_numbers(table))
-    for path, text in written.items():
-        with whole_file(path, "w") as stream:
-            stream.write(text)
+    written = [(folder.parent if report else folder) / "claims.json"]
+    with together():
+        write(written[0], VERDICTS, as_json(found))
+        if report:
+            written += [folder / "golden.json", report]
+            write(written[1], NUMBERS, as_json(golden_numbers(table)))
+            write(report, REPORT, put_between_marks(report.read_text(), "claims", claims_table(found)))
     print(f"wrote {', '.join(map(str, [folder / 'results.csv', *written]))}")
+
+
+def write(path, kind, text):
+    """Write a text, whole or not at all, over nothing of another kind."""
+    with whole_file(path, "w", kind) as stream:
+        stream.write(text)

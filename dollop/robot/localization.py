@@ -23,7 +23,7 @@ import numpy as np
 import scipy
 
 from dollop.checks import checked_array, checked_generator
-from dollop.gridmap import covered_cells, distances_to, in_cells
+from dollop.gridmap import covered_cells, distances_to, in_cells, in_metres
 from dollop.pose import rotation
 from dollop.robot.avoidance import FREE_BELOW
 
@@ -43,9 +43,10 @@ BEAM_STEP = 3
 LATTICE, HEADINGS = 0.15, 72
 """Distance in m between the poses of the lattice, and how many headings each place has."""
 MOST_POSES = 2_000_000
-"""Poses of the lattice that are kept, the best of all: as many as there are on 600 m^2 of floor. A
-worse one would hardly be drawn, and each takes 50 bytes for a moment: in a hall of 200 m there are
-a hundred million."""
+"""Poses of the lattice that are weighed, the most promising: as many as there are on 600 m^2 of
+floor. In a hall of 200 m there are a hundred million, of 50 bytes for a moment each."""
+SQUARE = 4
+"""Places of the lattice along the side of a square that is judged as a whole if there are many."""
 BLOCK = 1 << 18
 """Numbers that are looked up at once for the lattice."""
 TRACKING, SEARCHING = 250, 3000
@@ -69,8 +70,8 @@ class MonteCarloLocalizer:
     From "Probabilistic Robotics" (2005) and Lenser and Veloso (2000), see the top of this module.
 
     Memory: 16 bytes a cell of the map to follow a robot, and 40 to begin; 70 to search for one, and
-    no more than 140 however long its beams are. The best 2 million poses of the lattice are kept.
-    So 200 m x 200 m at 5 cm take less than 1 GiB, and the search a quarter of a minute.
+    no more than 140 however long its beams are. Of the lattice 2 million poses are weighed.
+    So 200 m x 200 m at 5 cm take less than 1 GiB, and a search some seconds.
 
     Parameters
     ----------
@@ -201,7 +202,11 @@ class MonteCarloLocalizer:
         return ranges[back, None] * directions + [self._laser_offset, 0.0]
 
     def lattice_scores(self, ends):
-        """Log likelihood of every pose of the lattice, by the wide field, or of the best 2 million.
+        """Log likelihood of every pose of the lattice, by the wide field, or of 2 million.
+
+        Of a larger lattice these are the most promising: all places of a square of 60 cm have at
+        most the sum of what each beam could find if it ended anywhere in such a square. If the best
+        of them is better than what the next square promises, it is the best of all.
 
         Parameters
         ----------
@@ -216,16 +221,26 @@ class MonteCarloLocalizer:
         """
         places, headings = self._lattice, np.arange(HEADINGS) * (2 * pi / HEADINGS)
         field = self._field_of(WIDE_SIGMA)  # not kept: it is for the lost
-        chosen, scores, least = np.zeros(0, np.intp), np.zeros(0, np.float32), -np.inf
-        for k, found in enumerate(field.lattice_log_likelihoods(places, headings, ends)):
-            better = np.flatnonzero(found >= least)
-            chosen = np.concatenate([chosen, k * len(places) + better])
-            scores = np.concatenate([scores, found[better]])
-            if len(scores) > MOST_POSES:
-                best = np.sort(np.argpartition(-scores, MOST_POSES)[:MOST_POSES])
-                chosen, scores = chosen[best], scores[best]
-                least = scores.min()
-        return chosen, scores
+        some = [np.arange(len(places))] * HEADINGS
+        if len(places) * HEADINGS > MOST_POSES:
+            some = self._promising(field, headings, ends)
+        scores = np.concatenate([*field.lattice_log_likelihoods(places, headings, ends, some)])
+        return np.concatenate([k * len(places) + each for k, each in enumerate(some)]), scores
+
+    def _promising(self, field, headings, ends):
+        """Places (N_k,) of the lattice for each heading, those of the squares that promise most."""
+        origin, resolution = self._frame
+        side = SQUARE * max(1, round(LATTICE / resolution))
+        column, row = in_cells(*self._lattice.T, origin, resolution)
+        squares = np.floor(np.column_stack([column, row])).astype(int) // side
+        corners, square = np.unique(squares, axis=0, return_inverse=True)
+        corners = np.column_stack(in_metres(*(corners.T * side + 0.5), origin, resolution))
+        promised = np.array([*field.lattice_log_likelihoods(corners, headings, ends, reach=side)])
+        few = MOST_POSES // SQUARE**2
+        best = np.argpartition(-promised.ravel(), few)[:few]
+        chosen = np.zeros(promised.shape, bool)
+        chosen.ravel()[best] = True
+        return [np.flatnonzero(each[square.ravel()]) for each in chosen]
 
     def lattice_poses(self, chosen):
         """Poses of the lattice.
@@ -296,25 +311,31 @@ class LikelihoodField:
         """Sum over the beams (M, 2) of log(floor + (1 - floor) q), for (N, 3) poses: (N,)."""
         return self.log_table[self.cells(poses, ends)].sum(axis=1)
 
-    def lattice_log_likelihoods(self, places, headings, ends):
+    def lattice_log_likelihoods(self, places, headings, ends, some=None, reach=1):
         """The same for places (N, 2) of each heading (K,) in rad, beams moved by whole cells: fast.
 
-        An iterator over (N,) float arrays. The border is as wide as the beams are long.
+        An iterator over (N,) float arrays; or only over some of the places, (N_k,) for each
+        heading. The border is as wide as the beams are long. With a reach in cells a beam counts as
+        if it had ended where it is likeliest in the square of that side to the right and above.
         """
         ends, most = self.within_reach(ends), np.array(self.shape) - 1
         longest = np.ceil(np.hypot(*ends.T).max(initial=0) / self.resolution) + 1
         border = np.minimum(longest, most).astype(int)
         beyond = {"mode": "constant", "constant_values": self.log_table[0]}
         table = np.pad(self.log_table.reshape(self.shape), border[:, None], **beyond)
+        for axis in (0, 1) if reach > 1 else ():
+            ahead = {"mode": "nearest", "origin": -(reach // 2), "output": table}
+            scipy.ndimage.maximum_filter1d(table, reach, axis, **ahead)
         columns, table = table.shape[1], table.ravel()
         poses = np.column_stack([places, np.zeros(len(places))])
         row, column = self._rows_and_columns(poses, np.zeros((1, 2)))
         here = (row + border[0]) * columns + column + border[1]
-        for heading in headings:
+        for k, heading in enumerate(headings):
             there = np.rint(ends @ rotation(heading).T / self.resolution)
             column, row = there.astype(np.int32).T
             apart = row.clip(-border[0], border[0]) * columns + column.clip(-border[1], border[1])
-            blocks = np.array_split(here, 1 + len(here) * len(ends) // BLOCK)
+            mine = here if some is None else here[some[k]]
+            blocks = np.array_split(mine, 1 + len(mine) * len(ends) // BLOCK)
             yield np.concatenate([table[block + apart].sum(axis=1) for block in blocks])
 
     def cells(self, poses, ends):

@@ -43,8 +43,8 @@ __all__ = ["Run", "Unicycle", "perform"]
 SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
 """A robot that does not know where it is turns on the spot, in rad/s, and moves off what it
 touches, in m/s: back, and if that has not helped within so many s, forth."""
-MOST_PERIODS = 500_000
-"""Control periods after which any run is given up: fourteen hours, ten times a second."""
+MOST_PERIODS = 100_000
+"""Control periods after which any run is given up: three hours or five kilometres, ten a second."""
 PERIODS = 1e-4, 10.0
 """s: no motor is told more often what to do, and none is left alone for longer."""
 SOONEST = 1e-6
@@ -260,7 +260,7 @@ def perform(
     kidnap : sequence of (float, (3,) sequence)
         At which times in s the robot is put at which poses.
     timeout : float
-        Give up after this time in s, and in any case after 500,000 control periods.
+        Give up after this time in s, and in any case after 100,000 control periods.
     localise_within : float
         Give up when the robot has not known where it is for this time in s. Until it knows, it
         turns on the spot, and moves off what it touches.
@@ -349,6 +349,7 @@ def check_robot(robot, kidnap):
         check_has("a robot to be kidnapped", robot, "place")
     checked_number("the robot's period", robot.period, *PERIODS)
     checked_flag("whether the robot is localised", robot.localised)
+    checked_array("the robot's pose", robot.pose, 3, finite=False)  # one that is lost may have none
     check_has("the robot's limits", robot.limits, *Limits._fields)
     Limits(*(getattr(robot.limits, name) for name in Limits._fields))
 

@@ -248,7 +248,7 @@ BAD_LINES = {
     "could not convert string to float: b.host": GOOD_LINE.replace("1.0 ", "", 1),
     "must be finite, .*, got nan": GOOD_LINE.replace("2.0", "nan", 1),
     "must be finite, .*, got inf": GOOD_LINE.replace("2.0", "inf", 1),
-    "a range must be finite and not negative, got -2.0": GOOD_LINE.replace("2.0", "-2.0", 1),
+    "a range must be finite, not negative .*, got -2": GOOD_LINE.replace("2.0", "-2.0", 1),
     "could not convert string to float: b'two'": GOOD_LINE.replace("2.0", "two", 1),
     "invalid literal for int.. with base 10: b'3.5'": GOOD_LINE.replace("FLASER 3", "FLASER 3.5"),
     "must be at least 1, got -3": GOOD_LINE.replace("FLASER 3", "FLASER -3"),
@@ -447,3 +447,72 @@ def test_odometry_needs_a_clock_for_half_of_it(tmp_path):
         else:
             with pytest.raises(FormatError, match="clock is useless: 16 of 30"):
                 carmen_log.read_odometry(path)
+
+
+# ---- numbers and lasers that cannot be
+
+
+def robotlaser(start=-1.0, step=0.5, limit=8.0, ranges=(1.0, 2.0, 3.0), t=0.0):
+    """One ROBOTLASER1 line."""
+    numbers = " ".join(map(str, ranges))
+    return (
+        f"ROBOTLASER1 0 {start} 1.0 {step} {limit} 0.01 0 {len(ranges)} {numbers} 0 1 2 3 1 2 3 0 0 0 0 0 {t} host {t}"
+    )
+
+
+GOOD = flaser((1.0, 2.0, 3.0), t=99.0)
+NO_LASER = {
+    "could not convert string to float: b'1_0'": GOOD.replace("1.0", "1_0", 1),
+    "invalid literal for int.. with base 10: b'0_3'": GOOD.replace("R 3", "R 0_3"),
+    "a number of readings must have at most nine digits, got b'9999": GOOD.replace("R 3", "R " + "9" * 5000),
+    "could not convert string to float: b'0x1p3'": GOOD.replace("1.0", "0x1p3", 1),
+    r"could not convert string to float: b'.xd9.xa1'": GOOD.replace("1.0", "\u0661", 1),
+    r"must be finite, and within 1e\+10, got 1e\+300": flaser((1.0, 2.0, 3.0), t="1e300"),
+    r"a range must be finite, not negative and within 1e\+09 m, got 2e\+09": GOOD.replace("2.0", "2e9", 1),
+    r"a pose must be within 1e\+09 m, got .5000000000.0, 0.0, 0.0": flaser((1.0, 2.0, 3.0), pose=(5e9, 0, 0)),
+    "a scan must have 1 to 36000 beams, got 36001": flaser([1.0] * 36_001),
+    "beams must spread over at most a full turn, got '3 beams from -1 rad": robotlaser(step=9),
+    "beams must spread over at most a full turn, got '3 beams from 99 rad": robotlaser(start=99),
+    "an angular resolution must be positive and finite, got 0.0": robotlaser(step=0),
+}
+
+
+@pytest.mark.parametrize("message", NO_LASER)
+def test_what_no_laser_says_is_refused(tmp_path, message):
+    """Numbers that only Python reads, and beams, ranges and places that cannot be, with the line and the rule."""
+    with pytest.raises(FormatError, match=rf"a\.log, line 1: .*{message}") as error:
+        read_log(write(tmp_path / "a.log", [NO_LASER[message]]))
+    assert len(str(error.value)) <= 300
+
+
+def test_a_host_may_have_an_underscore(tmp_path):
+    """It is no number."""
+    assert len(read_log(write(tmp_path / "a.log", [GOOD.replace("host", "my_host")]))) == 1
+
+
+def test_a_full_turn_is_none_too_many(tmp_path):
+    """Beams all round, first and last in one direction, are a laser's."""
+    log = carmen_log.read_log(write(tmp_path / "a.log", [robotlaser(-np.pi, np.pi)]))
+    np.testing.assert_allclose(log.angles, [-np.pi, 0, np.pi])
+
+
+@pytest.mark.parametrize("read", [read_log, carmen_log.read_odometry])
+def test_a_million_broken_lines_are_not_gone_through(tmp_path, read):
+    """When more are broken than could be forgiven, however many follow, the log is refused."""
+    name = "FLASER" if read is read_log else "ODOM"
+    (tmp_path / "a.log").write_text(f"{name}\n" * 300_000)
+    with pytest.raises(FormatError, match="20001 of 20001 scans are broken"):
+        read(tmp_path / "a.log")
+
+
+def test_more_readings_than_are_read(tmp_path, monkeypatch):
+    """Readings are counted over all scans."""
+    monkeypatch.setattr(carmen_log, "MAX_READINGS", 100)
+    with pytest.raises(FormatError, match="a.log, line 8: more than 100 readings, the most that is read"):
+        read_log(write(tmp_path / "a.log", flasers(9)))
+
+
+def test_odometry_tells_what_is_wrong(tmp_path):
+    """Where no message can be read, the first one is told."""
+    with pytest.raises(FormatError, match="line 1: could not convert string to float: b'0_1' .1 of 1 scans are broken"):
+        carmen_log.read_odometry(write(tmp_path / "a.log", ["ODOM 1 2 3 0_1 0 0 1 host 1"]))

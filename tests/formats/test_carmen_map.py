@@ -81,3 +81,34 @@ def test_a_written_map_is_read_back_in_place(tmp_path):
     read, origin, resolution = carmen_map.read_map(tmp_path / "a.map")
     np.testing.assert_array_equal(read, occupancy)
     assert origin == (1.5, -2.0) and resolution == 0.1
+
+
+CORNER = b"# Lower left    : %s\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (CORNER % b"1_0 2" + map_file(CELLS), "the lower left corner must be a number, got '1_0'"),
+        (CORNER % b"1e300 2" + map_file(CELLS), r"the lower left corner must be a number within 1e\+09, got"),
+        (CORNER % (b"1 " * 1000) + map_file(CELLS), "the lower left corner must be two numbers, got"),
+        (b"\n" * 70_000 + map_file(CELLS), "no CARMENMAPFILEv020 after the comment lines"),
+        (map_file(CELLS, struct.pack("<Bi", 9, 0) * 2000), "no gridmap chunk among the first 1000"),
+        (gzip.compress(map_file(CELLS)[:-1] + bytes(102 << 20), 1), "holds more than 101048576 bytes"),
+    ],
+)
+def test_maps_that_would_take_too_long_or_lie(tmp_path, content, message):
+    """Corners that only Python reads, heads and chunks without end, and more cells than there is room for."""
+    (tmp_path / "a.map").write_bytes(content)
+    with pytest.raises(FormatError, match=message) as error:
+        carmen_map.read_map(tmp_path / "a.map")
+    assert len(str(error.value)) <= 300
+
+
+def test_a_nan_that_signals_does_not_warn(tmp_path, recwarn):
+    """It is no probability, like any other."""
+    content = map_file(CELLS)
+    (tmp_path / "a.map").write_bytes(content[:-4] + bytes.fromhex("0100a07f"))
+    with pytest.raises(FormatError, match=r"an occupancy must be in \[0, 1\], .*, got nan"):
+        carmen_map.read_map(tmp_path / "a.map")
+    assert not recwarn

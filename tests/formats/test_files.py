@@ -128,7 +128,7 @@ def test_lines_are_counted_and_packed_ones_measured(tmp_path):
     with pytest.raises(FormatError, match="holds more than 2000000 lines, the most that is read"):
         sum(1 for _ in read_lines(tmp_path / "newlines"))
     (tmp_path / "alike.gz").write_bytes(gzip.compress((b"a" * 99_999 + b"\n") * 100))
-    with pytest.raises(FormatError, match="100 times its size, are the most that is read"):
+    with pytest.raises(FormatError, match="100 times its size are the most that is read"):
         list(read_lines(tmp_path / "alike.gz"))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dollop.formats import ros_bag_bounds
 from dollop.formats.files import FormatError
 from dollop.formats.logs import read_log, read_odometry
 from dollop.gridmap import OccupancyGrid
@@ -16,7 +17,7 @@ from dollop.pose import composed
 pytest.importorskip("rosbags", reason="the extra ros is not installed")
 
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -412,6 +413,93 @@ def test_maps_that_cannot_be_taken(tmp_path):
     with pytest.raises(FormatError, match=r"a map is named \.yaml"):
         found = OccupancyGrid(np.zeros((2, 2)), (0, 0), 0.1)
         found.save(tmp_path / "a.bag")
+
+
+# ---- bags that lie of themselves
+
+
+def test_records_that_run_past_the_end_are_refused(tmp_path):
+    """What a bag says of its lengths is not believed: rosbags would make room for it first."""
+    path = write_bag(tmp_path / "a.bag", "1", {"/scan": scans_of})
+    content = path.read_bytes()
+    path.write_bytes(content[:13] + b"\xff\xff\xff\x7f" + content[17:])
+    with pytest.raises(FormatError, match="a record at byte 13 runs past the end of the file"):
+        read_log(path)
+    path = next(write_bag(tmp_path / "b", "mcap", {"/scan": scans_of}).glob("*.mcap"))
+    content = path.read_bytes()
+    path.write_bytes(content[:9] + b"\xff" * 6 + content[15:])
+    with pytest.raises(FormatError, match="a record of 281474976710655 bytes at byte 8 runs past the end"):
+        read_log(path)
+
+
+def test_a_packed_chunk_has_bounds(tmp_path, monkeypatch):
+    """bzip2 packs a gigabyte into a kilobyte: no more is unpacked than there is room for."""
+    import bz2
+    from types import SimpleNamespace
+
+    from rosbags.rosbag1.reader import Chunk
+
+    packed = bz2.compress(bytes(ros_bag_bounds.MAX_CHUNK + 1))
+    reader = SimpleNamespace(chunks={0: Chunk(len(packed), 0, bz2.decompress)})
+    ros_bag_bounds.bound_chunks([reader])
+    assert len(packed) < 1000
+    with pytest.raises(ValueError, match="a chunk unpacks to more than 67108864 bytes"):
+        reader.chunks[0].decompressor(packed)
+    assert reader.chunks[0].decompressor(bz2.compress(b"scan")) == b"scan"
+
+
+@pytest.mark.parametrize("version", ["1", "mcap"])
+def test_packed_bags_are_read(tmp_path, monkeypatch, version):
+    """Chunks in whatever way they are packed hold the same scans, and none may hold more than its bound."""
+    store = get_typestore(Stores.ROS1_NOETIC if version == "1" else Stores.ROS2_HUMBLE)
+    if version == "1":
+        writer = Writer1(tmp_path / "a.bag")
+        writer.set_compression(Writer1.CompressionFormat.BZ2)
+    else:
+        writer = Writer2(tmp_path / "a", version=8, storage_plugin=StoragePlugin.MCAP)
+        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    serialize = store.serialize_ros1 if version == "1" else store.serialize_cdr
+    with writer as bag:
+        connection = bag.add_connection("/scan", SCAN, typestore=store)
+        for i, message in enumerate(scans_of(store)):
+            bag.write(connection, i, bytes(serialize(message, SCAN)))
+    path = tmp_path / ("a.bag" if version == "1" else "a")
+    assert len(read_log(path)) == 3
+    monkeypatch.setattr(ros_bag_bounds, "MAX_CHUNK", 100)
+    with pytest.raises(FormatError, match="a chunk (of .* bytes is larger than|unpacks to more than) 100"):
+        read_log(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[" * 3000, "brackets must be at most 20 deep"),
+        ("a: &a [x]\nb: *a\n", "there must be no anchors, aliases and tags"),
+        ("#" * 140_000, "holds more than 131072 bytes"),
+    ],
+)
+def test_metadata_have_bounds(tmp_path, text, message):
+    """rosbags takes ten seconds over a metadata.yaml of 3000 brackets."""
+    path = write_bag(tmp_path / "a", "2", {"/scan": scans_of})
+    (path / "metadata.yaml").write_text(text)
+    with pytest.raises(FormatError, match=rf"metadata\.yaml: {message}"):
+        read_log(path)
+
+
+def test_numbers_that_no_robot_has_are_refused(tmp_path, recwarn):
+    """Transforms and odometry beyond a billion metres, beams over more than a turn, ranges of a far galaxy."""
+    moving = [transforms("/tf", "odom", "laser", poses=[(1e300, 0.0, 0.0)])]
+    for k, (scans, beside, message) in enumerate(
+        [
+            (scans_of, moving, r"the numbers of a transform must be within 1e\+09 m, got 1e\+300"),
+            (lambda store: scans_of(store, step=9.0), [], "beams must spread over at most a full turn, got"),
+            (lambda store: scans_of(store, ranges=[np.nan] * 40_000, step=1e-4), [], "1 to 36000 beams, got 40000"),
+        ]
+    ):
+        path = write_bag(tmp_path / f"{k}.bag", "1", {"/scan": scans}, beside)
+        with pytest.raises(FormatError, match=message):
+            read_log(path)
+    assert not recwarn
 
 
 # ---- real bags

@@ -253,6 +253,7 @@ def either_parser(request, monkeypatch):
         (MAP_SERVER + "negate: 1\n", "a key must be a text, given once, got 'negate' on line 8"),
         (MAP_SERVER + "[1]: 2\n", "a key must be a text, given once, got .'1'. on line 8"),
         (MAP_SERVER + "a: " + "[" * 2000 + "]" * 2000, "brackets must be at most 20 deep within each other"),
+        ("#" + "]" * 30 + "\n" + MAP_SERVER + "a: " + "[" * 30, "brackets must be at most 20 deep"),
         ("{" * 5000, "brackets must be at most 20 deep within each other"),
         (MAP_SERVER + "".join(f"k{k}: 0\n" for k in range(600)), "holds more than 1000 nodes"),
         (MAP_SERVER + "#" * 70_000, "holds more than 65536 bytes, the most that is read"),

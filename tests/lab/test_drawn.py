@@ -83,3 +83,9 @@ def test_the_same_seed_draws_the_same():
     """A seed fixes the demonstrations, and further ones do not change the first."""
     few, more = draw_demonstrations(SLALOM, 3, 0.1, seed=8), draw_demonstrations(SLALOM, 5, 0.1, seed=8)
     assert all(np.array_equal(a, b) for a, b in zip(few, more, strict=False))
+
+
+def test_a_room_without_room_is_refused():
+    """Drawn anew ten thousand times, not for ever."""
+    with pytest.raises(ValueError, match="the room is too small"):
+        random_layouts(9, np.random.default_rng(0), room=1.0)

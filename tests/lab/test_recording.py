@@ -131,3 +131,30 @@ def test_what_is_no_json_is_named(tmp_path, text):
     (tmp_path / "eights_scene.json").write_text(text)
     with pytest.raises(FormatError, match="eights_scene.json: (not a scene|the file is empty)"):
         Recording.load(tmp_path / "eights.log")
+
+
+@pytest.mark.parametrize("name", ["eights_truth.csv", "eights_scene.json"])
+def test_what_is_missing_beside_the_log_is_named(tmp_path, name):
+    """A recording is three files; without one of them it is none."""
+    small_recording().save(tmp_path / "eights.log")
+    (tmp_path / name).unlink()
+    with pytest.raises(FormatError, match=f"{name}: a recording has its truth and its scene beside its log"):
+        Recording.load(tmp_path / "eights.log")
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "1_0", "0x1", "", "1e300", "1;2", "\u0661"])
+def test_the_truth_is_made_of_numbers(tmp_path, value):
+    """What pandas would take for one, or for none, is refused with its line."""
+    small_recording().save(tmp_path / "eights.log")
+    (tmp_path / "eights_truth.csv").write_text(f"t,x\n0.0,1.0\n0.1,{value}\n")
+    with pytest.raises(FormatError, match="eights_truth.csv, line 3: not a table of numbers: x must be a number"):
+        Recording.load(tmp_path / "eights.log")
+
+
+@pytest.mark.parametrize("text", ["t,t\n0,0\n1,1\n", "t,x\n0,1,2\n1,1,2\n", "t,x\n0\n1\n"])
+def test_the_truth_has_columns(tmp_path, text):
+    """None twice, and as many in each line as in the first."""
+    small_recording().save(tmp_path / "eights.log")
+    (tmp_path / "eights_truth.csv").write_text(text)
+    with pytest.raises(FormatError, match="columns must be t and of|a line must hold one for each of 2 columns"):
+        Recording.load(tmp_path / "eights.log")

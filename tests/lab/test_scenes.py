@@ -407,3 +407,40 @@ def test_the_section_is_what_a_plane_cuts():
     on_the_desk, on_the_stool = [(1.5, 6.6)], [(1.2, 5.98)]
     assert outline_distances(on_the_desk, low).min() > 0 > outline_distances(on_the_desk, high).min()
     assert outline_distances(on_the_stool, low).min() < 0 < outline_distances(on_the_stool, high).min()
+
+
+def test_a_way_out_of_the_world_is_refused_at_once():
+    """A robot that is to drive a billion metres leaves the room; no point of a way is asked for every 10 cm of it."""
+    with pytest.raises(ValueError, match="the robot's way must stand in the room and free"):
+        replace(HALL, robot=Robot(way=[(1e9, 1e9)]))
+    there_and_back = [(1.0, 1.0), (7.0, 1.0)] * 90
+    with pytest.raises(ValueError, match="the robot's way must be at most 1000 m long, got 10"):
+        replace(HALL, robot=Robot((4.0, 1.0, 0.0), way=there_and_back))
+
+
+@pytest.mark.parametrize("name", ["objects", "people", "moves"])
+def test_a_scene_has_no_more_than_a_thousand_of_anything(name):
+    """Each is set against each of the others."""
+    content = full_scene()
+    with pytest.raises(ValueError, match=f"{name} must be at most 1000, got 1001"):
+        Scene.from_dict(content | {name: content[name][:1] * 1001})
+
+
+@pytest.mark.parametrize("stops", [3, [3], ["ab"], [[1]], [[1, 2.0, 3]], None])
+def test_stops_are_pairs(stops):
+    """Of a place and a time, whatever a file has there."""
+    with pytest.raises(ValueError, match="stops must be a sequence of pairs, got"):
+        Person([(1, 1), (3, 1)], stops=stops)
+
+
+def test_a_scene_is_read_by_its_letter(tmp_path):
+    """A name given twice, NaN, and more values than are read are refused with the file's name."""
+    text = json.dumps(full_scene())
+    for content, message in (
+        (text[:-1] + ', "room": 1}', "a name must be given once, got 'room' again"),
+        (text.replace("0.36", "NaN"), "a number must be finite, .*, got NaN"),
+        ("[" + "[]," * 1_000_001 + "[]]", "holds more than 1000000 values"),
+    ):
+        (tmp_path / "room.json").write_text(content)
+        with pytest.raises(FormatError, match=f"room.json: not a scene: {message}"):
+            Scene.load(tmp_path / "room.json")

@@ -7,6 +7,8 @@ import pytest
 from rooms import figure_eight_task, room_map
 
 from dollop.environment import Environment
+from dollop.gridmap import OccupancyGrid
+from dollop.replication import runs
 from dollop.replication.runs import distances_to_law, free_poses, return_times
 from dollop.robot.avoidance import ObstacleMap
 from dollop.robot.performing import Unicycle, perform
@@ -78,3 +80,11 @@ def test_free_poses_are_free_and_everywhere(task):
 def test_a_run_without_a_kidnapping_has_no_time_of_return(task):
     """Nobody carried it off: there is nothing to come back from."""
     assert return_times(perform(task, Unicycle(START)), task.law).shape == (0,)
+
+
+def test_where_there_is_no_room_no_pose_is_drawn(monkeypatch):
+    """A map that is an obstacle all over has none, and nobody looks for ever."""
+    monkeypatch.setattr(runs, "DRAWS", 50)
+    full = ObstacleMap.of(Environment([]), OccupancyGrid(np.ones((20, 20)), (0.0, 0.0), 0.05))
+    with pytest.raises(ValueError, match="must have room for a robot, got none in 50 draws"):
+        free_poses(2, full, (0.5, 0.5), seed=0)

@@ -8,12 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from places import ROOT
 
 from dollop.checks import EXTRAS
 from dollop.cli import main
 from dollop.formats.files import FormatError
 from dollop.lds import LDS
-from dollop.replication import running, study
+from dollop.replication import ledger, running, study
 from dollop.replication.claims import (
     Claim,
     Criterion,
@@ -43,14 +44,13 @@ def counting(folder):
     return {"fake": claim_of(experiment)}
 
 
-def dying(folder, always=False):
-    """An experiment whose worker dies at seed 1, once or always; never the test's own process."""
-    here = os.getpid()
+def dying(folder, times):
+    """An experiment whose worker dies at seed 1, so many times."""
 
     def experiment(seed):
-        marker = folder / "died"
-        if seed == 1 and os.getpid() != here and (always or not marker.exists()):
-            marker.touch()
+        deaths = len(list(folder.glob("died-*")))
+        if seed == 1 and deaths < times:
+            (folder / f"died-{deaths}").touch()
             os._exit(1)
         return {"number": float(seed)}
 
@@ -80,7 +80,7 @@ def runs(tmp_path):
 def test_a_study_goes_on_where_it_was(tmp_path, runs):
     """Seeds that are in the table are kept as they are and not run again."""
     table = tmp_path / "results.csv"
-    first = study.run_study(["fake"], range(2), table, claims=counting(runs), jobs=1)
+    first = study.run_study(["fake"], range(2), table, claims=counting(runs), jobs=0)
     both = study.run_study(["fake"], range(4), table, claims=counting(runs), jobs=2)
     assert sorted(path.name for path in runs.iterdir()) == ["0-0", "1-0", "2-0", "3-0"]
     assert sorted(both.seed) == [0, 1, 2, 3]
@@ -91,29 +91,29 @@ def test_a_study_goes_on_where_it_was(tmp_path, runs):
 def test_a_number_that_is_new_is_filled_in(tmp_path, runs):
     """A claim with another criterion is run again for it, and no number stands twice."""
     claim = counting(runs)["fake"]
-    study.run_study(["fake"], [0], tmp_path / "results.csv", claims={"fake": claim}, jobs=1)
+    study.run_study(["fake"], [0], tmp_path / "results.csv", claims={"fake": claim}, jobs=0)
     more = replace(claim, criteria=(*claim.criteria, replace(claim.criteria[0], number="other")))
     more = replace(more, experiment=lambda seed: {"number": 1.0, "other": 2.0})
-    table = study.run_study(["fake"], [0], tmp_path / "results.csv", claims={"fake": more}, jobs=1)
+    table = study.run_study(["fake"], [0], tmp_path / "results.csv", claims={"fake": more}, jobs=0)
     assert dict(zip(table.number, table.value, strict=True)) == {"number": 1.0, "other": 2.0}
 
 
 def test_an_interrupted_study_loses_nothing(tmp_path, runs, monkeypatch):
     """What was done before Ctrl-C is in the table, and only the rest is run after it."""
-    table, write, written = tmp_path / "results.csv", study.write_table, []
+    table, append, written = tmp_path / "results.csv", ledger.Shared.append, []
 
     def interrupted(*arguments):
-        write(*arguments)
+        append(*arguments)
         written.append(1)
         if len(written) == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(study, "write_table", interrupted)
+    monkeypatch.setattr(ledger.Shared, "append", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        study.run_study(["fake"], range(5), table, claims=counting(runs), jobs=1)
+        study.run_study(["fake"], range(5), table, claims=counting(runs), jobs=0)
     assert len(study.read_table(table)) == 2
     monkeypatch.undo()
-    study.run_study(["fake"], range(5), table, claims=counting(runs), jobs=1)
+    study.run_study(["fake"], range(5), table, claims=counting(runs), jobs=0)
     assert sorted(study.read_table(table).seed) == [0, 1, 2, 3, 4]
     assert len([path for path in runs.iterdir() if path.name.startswith(("0-", "1-"))]) == 2
 
@@ -122,28 +122,34 @@ def test_a_failed_experiment_is_named_and_run_again(tmp_path, runs):
     """The others are kept, claim, seed and reason are named, the next call runs that seed alone."""
     table, stumble = tmp_path / "results.csv", stumbling(runs)
     with pytest.raises(RuntimeError, match="claim fake, seed 1: ValueError: a stone"):
-        study.run_study(["fake"], range(3), table, claims=stumble, jobs=1)
+        study.run_study(["fake"], range(3), table, claims=stumble, jobs=0)
     assert sorted(study.read_table(table).seed) == [0, 2]
-    again = study.run_study(["fake"], range(3), table, claims=stumble, jobs=1)
+    again = study.run_study(["fake"], range(3), table, claims=stumble, jobs=0)
     assert sorted(again.seed) == [0, 1, 2]
     assert not list(runs.glob("*-1"))
 
 
 def test_a_worker_that_dies_is_retried_and_reported(tmp_path, runs, capsys):
-    """The study finishes, and says that a worker died."""
+    """The study finishes, and says over what the worker died."""
     path = tmp_path / "results.csv"
-    table = study.run_study(["fake"], range(4), path, claims=dying(runs), jobs=2)
+    table = study.run_study(["fake"], range(4), path, claims=dying(runs, 1), jobs=2)
     assert sorted(table.seed) == [0, 1, 2, 3] and (table.seed == table.value).all()
-    assert "a worker died" in capsys.readouterr().err
+    assert "a worker died over claim fake, seed 1" in capsys.readouterr().err
 
 
-def test_workers_that_keep_dying_end_the_study(tmp_path, runs):
-    """It gives up naming the seeds, and keeps what was done."""
+def test_what_kills_its_worker_again_and_again_is_set_aside(tmp_path, runs, capsys):
+    """After three deaths, two of them alone, it is named and has a line of its own; all others are done.
+
+    When the study is run again, so is that seed, and its line gives way to its number.
+    """
     path = tmp_path / "results.csv"
-    study.run_study(["fake"], [0], path, claims=dying(runs), jobs=2)
-    with pytest.raises(RuntimeError, match=r"3 times in a row over the seeds \[1\]"):
-        study.run_study(["fake"], [0, 1], path, claims=dying(runs, always=True), jobs=2)
-    assert study.read_table(path).seed.tolist() == [0]
+    with pytest.raises(RuntimeError, match="1 jobs were set aside: claim fake, seed 1: killed its worker 3 times"):
+        study.run_study(["fake"], range(6), path, claims=dying(runs, 3), jobs=2)
+    assert study.read_table(path).seed.tolist() == [0, 2, 3, 4, 5]
+    assert path.read_text().count("fake,1,not done: killed its worker 3 times") == 1
+    assert "set aside: claim fake, seed 1" in capsys.readouterr().err
+    assert study.run_study(["fake"], range(6), path, claims=dying(runs, 3), jobs=2).seed.tolist() == list(range(6))
+    assert "not done" not in path.read_text()
 
 
 def cluster_of_two(distributed):
@@ -163,20 +169,15 @@ def test_a_dask_cluster_gives_the_same_numbers(tmp_path):
     pd.testing.assert_frame_equal(here, there)
 
 
-def test_a_dask_worker_that_dies_for_good_ends_the_study(tmp_path, runs, monkeypatch, capsys):
+def test_what_dask_gives_up_is_set_aside(tmp_path, runs):
     """The study does not wait for what a cluster has given up; the other seeds are kept."""
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
-    monkeypatch.setattr(running, "PATIENCE", 3.0)
-    monkeypatch.setattr(running, "ATTEMPTS", 1)
     path = tmp_path / "results.csv"
-    with (
-        cluster_of_two(distributed) as cluster,
-        pytest.raises(RuntimeError, match="workers died"),
-    ):
-        claims = dying(runs, always=True)
-        study.run_study(["fake"], range(4), path, cluster.scheduler_address, claims)
-    assert 1 not in study.read_table(path).seed.tolist()
-    assert "a worker died" in capsys.readouterr().err
+    with cluster_of_two(distributed) as cluster, distributed.Client(cluster) as client:
+        client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 1))
+        with pytest.raises(RuntimeError, match="1 jobs were set aside: claim fake, seed 1"):
+            study.run_study(["fake"], range(4), path, cluster.scheduler_address, dying(runs, 99))
+    assert study.read_table(path).seed.tolist() == [0, 2, 3]
 
 
 def test_the_command_writes_table_and_claims(tmp_path, capsys):
@@ -225,7 +226,7 @@ def test_a_missing_laboratory_is_said_before_the_work(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("content", ["", "a,b\n1,2\n", "claim,seed,number,value\nx,one,y,2\n"])
+@pytest.mark.parametrize("content", ["", "a,b\n1,2\n", "claim,seed,number,value\nloss,1,lost_per_lap,2\n"])
 def test_a_table_of_something_else_is_refused(content, tmp_path):
     """A file that holds no results is named, not overwritten."""
     path = tmp_path / "results.csv"
@@ -233,6 +234,52 @@ def test_a_table_of_something_else_is_refused(content, tmp_path):
     with pytest.raises(FormatError, match=r"results\.csv"):
         study.run_study(["fake"], range(2), path)
     assert path.read_text() == content
+
+
+def test_numbers_of_other_code_are_made_anew(tmp_path, runs, monkeypatch, capsys):
+    """They are counted on the error stream, the new number takes the place of the old; what nobody asks for stays."""
+    path, claims = tmp_path / "results.csv", counting(runs)
+    monkeypatch.setattr(study, "fingerprint", lambda module: "0" * 12)
+    study.run_study(["fake"], range(3), path, claims=claims, jobs=0)
+    monkeypatch.setattr(study, "fingerprint", lambda module: "1" * 12)
+    study.run_study(["fake"], range(2), path, claims=claims, jobs=0)
+    assert sorted(each.name for each in runs.iterdir()) == ["0-0", "0-1", "1-0", "1-1", "2-0"]
+    assert [line.split(",")[3] for line in path.read_text().splitlines()[1:]] == ["1" * 12, "1" * 12, "0" * 12]
+    told = capsys.readouterr().err
+    assert f"2 rows of {path} are of other code" in told and f"1 rows of {path} are of other code and stay" in told
+
+
+def test_a_criterion_that_is_changed_keeps_its_numbers_and_is_told(tmp_path, runs, capsys):
+    """What is wanted of a number does not change it; but it should have been there before."""
+    path, claims = tmp_path / "results.csv", counting(runs)
+    study.run_study(["fake"], range(2), path, claims=claims, jobs=0)
+    assert "older than the criteria" not in capsys.readouterr().err
+    claim = claims["fake"]
+    other = replace(claim, criteria=(replace(claim.criteria[0], wanted=(4, 5)),))
+    study.run_study(["fake"], range(2), path, claims={"fake": other}, jobs=0)
+    assert "numbers are older than the criteria that judge them now, and are kept: fake" in capsys.readouterr().err
+    assert len(list(runs.iterdir())) == 2
+
+
+def test_numbers_come_back_to_six_digits(tmp_path):
+    """Whatever they are, nan included; an infinite one is refused, as no mean can have it."""
+    values = [0.0, -1.0, 12345.678, 1.23456789e-12, 1 / 3, float("nan"), 1e300]
+    claims = {"fake": claim_of(lambda seed: {"number": values[seed]})}
+    table = study.run_study(["fake"], range(len(values)), tmp_path / "results.csv", claims=claims, jobs=0)
+    expected = [float(f"{value:.6g}") for value in values]
+    assert np.array_equal(table.value, expected, equal_nan=True)
+    assert np.array_equal(study.read_table(tmp_path / "results.csv").value, expected, equal_nan=True)
+    values.append(float("inf"))
+    with pytest.raises(RuntimeError, match="number must be finite or nan, got inf"):
+        study.run_study(["fake"], [len(values) - 1], tmp_path / "results.csv", claims=claims, jobs=0)
+
+
+def test_every_line_of_the_study_is_sound_and_of_one_code_for_each_claim():
+    """The committed table has a line for each claim and seed, in order, none of them damaged or set aside."""
+    rows, damaged = study.ledger_at(ROOT / "study" / "results.csv").read()
+    jobs = [(row["claim"], int(row["seed"])) for row in rows]
+    assert damaged == 0 and jobs == sorted(set(jobs)) and all(map(study.numbers_of, rows))
+    assert len({(row["claim"], row["code"]) for row in rows}) == len({row["claim"] for row in rows})
 
 
 def test_intervals_cover_the_truth():
@@ -461,6 +508,7 @@ def test_errors_depend_on_the_noise():
 def test_noise_is_chosen_anew_with_the_study_itself(tmp_path, monkeypatch):
     """Beside REPLICATION.md and without a table, and in no other case."""
     monkeypatch.setattr(study, "run_study", lambda *_: study.as_table())
+    header = ",".join([*study.LINE, "check"]) + "\n"
     chosen = []
     monkeypatch.setattr(study, "choose_noises", lambda: chosen.append(1))
     marks = "<!-- claims: begin -->\n<!-- claims: end -->\n"
@@ -476,6 +524,6 @@ def test_noise_is_chosen_anew_with_the_study_itself(tmp_path, monkeypatch):
         if report:
             (place.parent / "REPLICATION.md").write_text(marks)
         if table:
-            study.write_table(study.as_table(), place / "results.csv")
+            (place / "results.csv").write_text(header)
         main(["study", "combined", "--folder", str(place)])
         assert len(chosen) == times

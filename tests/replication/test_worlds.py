@@ -223,14 +223,15 @@ def test_an_error_ends_the_chain_and_is_told(monkeypatch, worlds):
 # ---- the study
 
 
-def fake_work(seed, _=None):
+def fake_work(job):
     """A row without a world."""
+    seed = int(job[0])
     row = dict.fromkeys(survey.COLUMNS, "") | {"seed": str(seed), "kind": KINDS[seed % len(KINDS)], "draws": "1"}
     ends = {0: ("right", ""), 1: ("refused", ""), 2: ("silently wrong", "user in part; collision")}
     outcome, causes = ends[seed % 3]
     stage = {"refused": "adapt"}.get(outcome, "")
     shares = {"user_right": f"{0.5 + seed / 1000}", "covered": "1", "law_covered": "1", "law_astray": "0"}
-    return seed, row | shares | {
+    return row | shares | {
         "outcome": outcome, "causes": causes, "cause": causes.split(";")[0], "stage": stage
     }  # fmt: skip
 
@@ -244,9 +245,9 @@ def fake(monkeypatch):
 def test_a_study_of_worlds_goes_on_where_it_was(tmp_path, fake, monkeypatch):
     """What is in the table is kept as it is, only the rest is run, and the table is in the order of seeds."""
     path, seen = tmp_path / "worlds.csv", []
-    first = survey.run_survey(range(4, 8), path, jobs=1)
-    monkeypatch.setattr(survey, "work", lambda seed, _: (seen.append(seed), fake_work(seed))[1])
-    both = survey.run_survey(range(10), path, jobs=1)
+    first = survey.run_survey(range(4, 8), path, jobs=0)
+    monkeypatch.setattr(survey, "work", lambda job: (seen.append(int(job[0])), fake_work(job))[1])
+    both = survey.run_survey(range(10), path, jobs=0)
     assert sorted(seen) == [0, 1, 2, 3, 8, 9]
     assert both.index.tolist() == list(range(10)) == survey.read_table(path).index.tolist()
     assert both.loc[4:7].equals(first)
@@ -254,7 +255,7 @@ def test_a_study_of_worlds_goes_on_where_it_was(tmp_path, fake, monkeypatch):
 
 def test_the_summary_counts_by_kind_and_cause(tmp_path, fake):
     """Ends add up to the worlds of each kind, causes are counted in every world that has them, the first apart."""
-    table = survey.run_survey(range(33), tmp_path / "worlds.csv", jobs=1)
+    table = survey.run_survey(range(33), tmp_path / "worlds.csv", jobs=0)
     found = survey.summary(table)
     assert found["kinds"]["all"] == {
         "worlds": 33, "right": 11, "refused": 11, "doubtful": 0, "silently wrong": 11, "refused later": 0
@@ -269,7 +270,7 @@ def test_the_summary_counts_by_kind_and_cause(tmp_path, fake):
 
 def test_the_worst_come_first(tmp_path, fake):
     """The sheet shows silently wrong worlds: of each kind the one with the least share right, then the next."""
-    table = survey.run_survey(range(60), tmp_path / "worlds.csv", jobs=1)
+    table = survey.run_survey(range(60), tmp_path / "worlds.csv", jobs=0)
     worst = survey.worst_seeds(table)
     assert len({seed % len(KINDS) for seed in worst[: len(KINDS)]}) == len(KINDS)
     assert sorted(worst[: len(KINDS)]) == list(range(2, 2 + 3 * len(KINDS), 3)) and worst[len(KINDS)] == 35

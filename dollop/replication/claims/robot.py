@@ -88,7 +88,8 @@ def state(seed):
     """
     task = recordings.figure_eights(seed).task
     (start,) = recordings.starts_near_the_beginning(task, 1, np.random.default_rng([seed, 5]))
-    bare = replace(task, environment=Environment(np.empty((0, 4))))
+    gone = np.full(len(task.objects), -1)
+    bare = replace(task, environment=Environment(np.empty((0, 4))), objects=gone)
     runs = [plain_run(each, start) for each in (task, bare)]
     common = min(len(run.t) for run in runs)
     apart = np.linalg.norm(runs[0].poses[:common, :2] - runs[1].poses[:common, :2], axis=1)

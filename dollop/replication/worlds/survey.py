@@ -1,11 +1,13 @@
 """The study of random worlds behind "Outside the paper's room" in REPLICATION.md: `dollop study worlds`.
 
-One row for each seed goes into study/worlds.csv, which is replaced whole after every world, so that an
-interrupted study goes on where it was. From the table come worlds.json, the summary by kind; a sheet
-of pictures of the worst worlds; and the tables in the report.
+One line for each seed goes into study/worlds.csv, with the fingerprint of the code that made it and a
+checksum. It is added to after every world, by as many studies at a time as there are, and an interrupted
+study goes on where it was. From the table come worlds.json, the summary by kind; a sheet of pictures of
+the worst worlds; and the tables in the report.
 """
 
 from collections import Counter
+from math import isfinite
 from pathlib import Path
 
 import joblib
@@ -13,29 +15,32 @@ import numpy as np
 import pandas as pd
 
 from dollop.checks import need
-from dollop.formats.files import FormatError
+from dollop.formats.files import warn_of
 from dollop.formats.kinds import PNG, Kind
 from dollop.formats.writing import check_writable, together, whole_file
-from dollop.replication.running import as_json, going_on_in, put_between_marks, report_beside, run_all
+from dollop.replication.fingerprint import fingerprint
+from dollop.replication.ledger import NOT_DONE, Ledger
+from dollop.replication.running import REPORT, as_json, going_on_in, put_between_marks, report_beside, run_all
 from dollop.replication.worlds.chain import CAUSES, COLUMNS, OUTCOMES, judge
 from dollop.replication.worlds.draw import KINDS, draw
 
 __all__ = ["FIRST", "command", "read_table", "summary"]
 
 SEEDS, QUICK_SEEDS = 300, 11
+NUMBERS = COLUMNS[COLUMNS.index("draws") :]
+"""Columns of the table that hold numbers, or nothing."""
 WORST = 12
 """How many worlds the sheet of pictures shows."""
 FIRST = "worlds_first.csv"
 """The table of the first run, before anything was mended; beside the table if it is there."""
 SUMMARY = Kind("a summary of worlds", rb'\A\{\s*"seeds":')
-REPORT = Kind("a report", rb"\A#|<!-- \w+: begin -->")
 
 
-def work(seed, _=None):
-    """The seed, and its row of the table: every value as it is written."""
-    world = draw(seed)
+def work(job):
+    """The row of a world's seed, a job of its own: every value as it is written."""
+    world = draw(int(job[0]))
     row = judge(world).row(world)
-    return seed, {name: written(value) for name, value in row.items()}
+    return {name: written(value) for name, value in row.items()}
 
 
 def written(value):
@@ -47,6 +52,8 @@ def written(value):
 
 def read_table(path):
     """Read a table of worlds.
+
+    Lines that are damaged are left out, with a warning; of each seed the last counts.
 
     Parameters
     ----------
@@ -63,38 +70,44 @@ def read_table(path):
     FormatError
         If the file is something else.
     """
-    path = Path(path)
-    if not path.exists():
-        return as_table([])
+    ledger = ledger_at(Path(path))
+    rows, damaged = ledger.read()
+    if damaged:
+        warn_of(path, f"{damaged} lines are damaged and left out")
+    return as_table(ledger.latest(rows, is_done))
+
+
+def ledger_at(path):
+    """The table of worlds at a path, as it is in the file."""
+    return Ledger(path, (*COLUMNS, "code"), keys=1, why="told", sound=is_sound)
+
+
+def is_sound(row):
+    """Whether a line is one that a study writes: with an outcome and numbers, or set aside."""
+    if not is_done(row):
+        return row["told"].startswith(NOT_DONE)
     try:
-        table = pd.read_csv(path, dtype=str, keep_default_na=False)
-        if list(table.columns) != list(COLUMNS):
-            raise ValueError(f"columns must be {', '.join(COLUMNS)}, got {', '.join(table.columns)}")
-        unknown = set(table.outcome) - set(OUTCOMES)
-        if table.seed.duplicated().any():
-            raise ValueError(f"seeds must be there once, got {table.seed[table.seed.duplicated()].iloc[0]} twice")
-        if unknown:
-            raise ValueError(f"an outcome must be one of {', '.join(OUTCOMES)}, got {unknown.pop()!r}")
-        return as_table(table)
-    except ValueError as error:
-        raise FormatError(f"not a table of worlds: {error}", path) from error
+        return all(isfinite(float(row[name] or 0)) for name in NUMBERS) and row["draws"].isdecimal()
+    except ValueError:
+        return False
+
+
+def is_done(row):
+    """Whether a line has an outcome, and was not set aside."""
+    return row["outcome"] in OUTCOMES
 
 
 def as_table(rows):
-    """Rows as the table, in the order of the seeds."""
-    table = pd.DataFrame(rows, columns=list(COLUMNS)).astype(str)
+    """Lines as the table, in the order of the seeds, without those that were set aside."""
+    table = pd.DataFrame(filter(is_done, rows), columns=list(COLUMNS)).astype(str)
     table.index = table.seed.astype(int)
     return table.sort_index()
 
 
-def write_table(table, path):
-    """Write the table, whole or not at all."""
-    with whole_file(path, "w") as stream:
-        table.to_csv(stream, index=False)
-
-
 def run_survey(seeds, path, scheduler=None, jobs=-1):
     """Fill the table with the worlds that are missing in it; its rows of these seeds.
+
+    Rows count that code of today has made, which has the same fingerprint; others are made anew.
 
     Parameters
     ----------
@@ -104,21 +117,28 @@ def run_survey(seeds, path, scheduler=None, jobs=-1):
     scheduler : str, optional
         Address of a Dask scheduler; all cores of this machine without it.
     jobs : int
-        Number of worker processes on this machine, -1 for one per core.
+        Number of worker processes on this machine, -1 for one per core, 0 for none but this.
 
     Returns
     -------
     pandas.DataFrame
+
+    Raises
+    ------
+    RuntimeError
+        If worlds failed or killed their workers, which are named; or if workers died whatever they
+        were at. All that was finished is in the table.
+    FormatError
+        If the file is something else.
     """
-    table = read_table(path)
+    stamp = {"code": fingerprint(draw.__module__, judge.__module__)}
 
-    def keep(found):
-        nonlocal table
-        table = as_table(pd.concat([table, pd.DataFrame([found[1]])]))
-        write_table(table, path)
+    def answers(row):
+        return is_done(row) and row["code"] == stamp["code"]
 
-    run_all({seed: None for seed in seeds if seed not in table.index}, work, keep, scheduler, jobs)
-    return table.loc[[seed for seed in seeds if seed in table.index]]
+    asked = [(str(seed),) for seed in seeds]
+    table = as_table(run_all(ledger_at(path), asked, answers, lambda job: stamp, work, scheduler, jobs))
+    return table.loc[list(seeds)]
 
 
 # ---- summing up
@@ -138,7 +158,14 @@ def summary(table):
         "kinds": for each kind, and for "all", worlds, each outcome, and how many of the silently wrong
         ones were refused later; "causes": how many worlds had each, and how many of all had it as the
         first; "refusals": how many at each step; "draws": the mean number of draws of a world.
+
+    Raises
+    ------
+    ValueError
+        If the table has no row.
     """
+    if not len(table):
+        raise ValueError("a summary needs a world, got a table of none")
     groups = {kind: table[table.kind == kind] for kind in KINDS} | {"all": table}
     return {
         "seeds": [int(table.index.min()), int(table.index.max())],
@@ -175,7 +202,13 @@ def tables(found, first=None):
     for cause, counts in found["causes"].items():
         lines.append(row([cause, *counts.values(), *([first["causes"][cause]["worlds"]] if first else [])]))
     steps = ", ".join(f"{count} at {step}" for step, count in sorted(found["refusals"].items()))
-    return "\n".join([*lines, "", f"Refused: {steps or 'none'}. Draws of a world until it was fair: {found['draws']}."])
+    return "\n".join(
+        [
+            *lines,
+            "",
+            f"Refused: {steps or 'none'}. Draws of a world until it was fair: {found['draws']}.",
+        ]
+    )
 
 
 def row(cells):

@@ -1,4 +1,4 @@
-"""Bags of ROS looked through before they are opened: lengths that fit, and chunks that there is room for.
+"""Bags of ROS looked through before they are opened: lengths that fit, chunks of bounded size.
 
 rosbags believes what a bag says of its own lengths, and unpacks whatever a chunk holds.
 """
@@ -7,6 +7,7 @@ import bz2
 import struct
 from collections import deque
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 from dollop.formats.files import FormatError, from_file, read_bytes
@@ -14,7 +15,7 @@ from dollop.formats.files import FormatError, from_file, read_bytes
 __all__ = ["MAX_CHUNK", "bound_chunks", "check_bag"]
 
 MAX_CHUNK = 1 << 26
-"""Bytes that a chunk may unpack to: rosbag writes 768 KiB, ROS 2 4 MiB, and bzip2 packs a gigabyte into one."""
+"""Bytes that a chunk may unpack to: rosbag writes 768 KiB, ROS 2 4 MiB; bzip2 packs a gigabyte."""
 MAX_METADATA, MAX_NODES = 1 << 17, 10_000
 """Bytes and nodes of a bag's metadata.yaml: a hundred topics with their settings."""
 BAG, MCAP = b"#ROSBAG V2.0\n", b"\x89MCAP0\r\n"
@@ -28,14 +29,14 @@ def check_bag(path):
     Parameters
     ----------
     path : str or Path
-        A `.bag`, an `.mcap`, or a folder with a `metadata.yaml`; of what else there is nothing is asked.
+        A `.bag`, an `.mcap`, or a folder with a `metadata.yaml`; nothing is asked of what else it is.
 
     Raises
     ------
     FormatError
-        Where a record runs past the end of the file, a chunk of an mcap file unpacks to more than 64 MiB,
-        or the metadata are larger than 128 KiB, have more than 10,000 nodes, anchors, aliases or tags, or
-        brackets within each other more than 20 deep.
+        Where a record runs past the end of the file, a chunk of an mcap file unpacks to more than
+        64 MiB, or the metadata are larger than 128 KiB, have more than 10,000 nodes, or are refused
+        by `dollop.formats.plain_yaml.plain_nodes`.
     """
     path = Path(path)
     if path.is_dir():
@@ -59,12 +60,8 @@ def bound_chunks(readers):
     readers : sequence of rosbags' readers
         Open; they are changed.
     """
-    import lz4.frame
-
-    kinds = {
-        bz2.decompress: bz2.BZ2Decompressor,
-        lz4.frame.decompress: lz4.frame.LZ4FrameDecompressor,
-    }
+    lz4 = import_module("lz4.frame")  # which rosbags brings
+    kinds = {bz2.decompress: bz2.BZ2Decompressor, lz4.decompress: lz4.LZ4FrameDecompressor}
     for reader in readers:
         chunks = getattr(reader, "chunks", {})
         for place, chunk in chunks.items():
@@ -101,7 +98,8 @@ def _check_mcap(path, stream, size):
     while (place := stream.tell()) + 9 <= size - len(MCAP):
         kind, length = struct.unpack("<BQ", stream.read(9))
         if length > size - stream.tell():
-            raise FormatError(f"a record of {length} bytes at byte {place} runs past the end of the file", path)
+            found = f"a record of {length} bytes at byte {place}"
+            raise FormatError(f"{found} runs past the end of the file", path)
         if kind == CHUNK:
             _check_chunk(path, stream.read(length))
         else:
@@ -114,7 +112,8 @@ def _check_chunk(path, chunk):
         raise FormatError(f"a chunk must have 40 bytes at least, got {len(chunk)}", path)
     (unpacked,), (named,) = struct.unpack_from("<Q", chunk, 16), struct.unpack_from("<I", chunk, 28)
     if unpacked > MAX_CHUNK:
-        raise FormatError(f"a chunk of {unpacked} bytes is larger than {MAX_CHUNK}, the most that is read", path)
+        rule = f"is larger than {MAX_CHUNK}, the most that is read"
+        raise FormatError(f"a chunk of {unpacked} bytes {rule}", path)
     kind = _mcap_kinds().get(chunk[32 : 32 + min(named, 40)])
     try:
         if kind:
@@ -124,11 +123,8 @@ def _check_chunk(path, chunk):
 
 
 def _mcap_kinds():
-    """Decompressors by the name that mcap has for them."""
-    import lz4.frame
+    """Decompressors by the name that mcap has for them; rosbags brings their modules."""
+    from rosbags.rosbag2.storage_mcap import zstd
 
-    try:
-        from compression import zstd
-    except ImportError:  # before Python 3.14
-        from backports import zstd
-    return {b"lz4": lz4.frame.LZ4FrameDecompressor, b"zstd": zstd.ZstdDecompressor}
+    lz4 = import_module("lz4.frame")
+    return {b"lz4": lz4.LZ4FrameDecompressor, b"zstd": zstd.ZstdDecompressor}
