@@ -1,6 +1,6 @@
 # make figures   set up .venv from the lock, then regenerate every figure
 # make test      the same set-up, then unit tests, doctests and the notebooks
-.PHONY: help figures test fast coverage check study worlds bench book data clean
+.PHONY: help figures test fast coverage fuzz check study worlds bench book data clean
 .DEFAULT_GOAL := help
 
 # The lock is for Python 3.11: the first of these that really is one.
@@ -11,6 +11,11 @@ export MPLBACKEND := Agg
 # The matrices here are tiny: more threads only get into each other's way, and cost up to five times the time.
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
+
+FUZZ_FILES ?= 20000
+FUZZ_CALLS ?= 3000
+FUZZ_KILLS ?= 100
+FUZZ_SEED ?= 0
 
 help:  ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -27,6 +32,12 @@ fast: .venv/ready  ## the tests of the library alone, without the replication
 
 coverage: .venv/ready  ## which lines of the library its tests run
 	$(RUN) -m pytest -q -m "not replication" --cov=dollop --cov-report=term
+
+fuzz: .venv/ready  ## damaged files, hostile calls, kills: half an hour; FUZZ_FILES=100000 FUZZ_SEED="0 1" for others
+	$(RUN) tests/fuzzing --files $(FUZZ_FILES) --calls $(FUZZ_CALLS) --seed $(FUZZ_SEED)
+	$(RUN) tests/fuzzing/kills.py --kills $(FUZZ_KILLS) --seed 0
+	$(RUN) tests/fuzzing/study_kills.py --kills $(FUZZ_KILLS) --seed 0
+	$(RUN) tests/fuzzing/study_kills.py --kills $(FUZZ_KILLS) --seed 1 --at-once 4
 
 check: .venv/ready  ## lint and formatting
 	$(RUN) -m ruff check .
