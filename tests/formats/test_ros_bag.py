@@ -433,6 +433,10 @@ def test_records_that_run_past_the_end_are_refused(tmp_path):
     path.write_bytes(content[:9] + b"\xff" * 6 + content[15:])
     with pytest.raises(FormatError, match="a record of 281474976710655 bytes at byte 8 runs past the end"):
         read_log(path)
+    for lie in (b"\1", b"\0\0\0\0\0\1"):
+        path.write_bytes(content[:-28] + lie + content[-28 + len(lie) :])
+        with pytest.raises(FormatError, match="the index must be where a record begins, and a footer at the end"):
+            read_log(path)
 
 
 def test_a_packed_chunk_has_bounds(tmp_path, monkeypatch):
