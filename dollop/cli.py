@@ -90,7 +90,7 @@ def _parser():
     log.add_argument("--topic", help="LaserScan topic of a bag, if there are several")
     log.add_argument(
         "--fov",
-        type=_degrees,
+        type=degrees,
         metavar="DEGREES",
         help="field of view, if the log does not state it",
     )
@@ -102,7 +102,7 @@ def _parser():
 
     add = command(_map, "map", "build a background map from a log with known poses", log)
     add("map", help="what to write: .yaml (ROS map_server) or .map (CARMEN)")
-    add("--resolution", type=float, default=0.05, help="m per cell (default: 0.05)")
+    add("--resolution", type=number, default=0.05, help="m per cell (default: 0.05)")
     add = command(_observe, "observe", "track the user in a laser log", log)
     add("map", help="background map: .yaml (ROS map_server) or .map (CARMEN)")
     add(
@@ -115,7 +115,7 @@ def _parser():
     add("--tracks", metavar="FILE", help="everybody's trajectories, a .csv")
     add(
         "--min-area",
-        type=float,
+        type=number,
         default=0.01,
         help="smallest foreground object in m^2 (default: 0.01)",
     )
@@ -137,17 +137,27 @@ def _parser():
         metavar="claim",
         help="which (default: all); an unknown one lists them; worlds: random worlds",
     )
-    add("--seeds", type=int, help="how many (default: 100; 300 worlds)")
-    add("--first-seed", type=int, default=0, metavar="N", help="of the worlds (default: 0)")
+    add("--seeds", type=whole, help="how many (default: 100; 300 worlds)")
+    add("--first-seed", type=whole, default=0, metavar="N", help="of the worlds (default: 0)")
     add("--quick", action="store_true", help="3 seeds, or 11 worlds, for a look")
     add("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     add("--folder", type=Path, help="for the table (default: study; study-quick with --quick)")
     return root, tuple(commands.choices)
 
 
-def _degrees(degrees):
+def number(text):
+    """A number as people write it: to Python 1_0 is ten."""
+    return float(text if text.isascii() and "_" not in text else "no number")
+
+
+def whole(text):
+    """A whole number, likewise."""
+    return int(text if text.isascii() and "_" not in text else "no number")
+
+
+def degrees(text):
     """The angle in rad that so many degrees are."""
-    return float(np.radians(float(degrees)))
+    return float(np.radians(number(text)))
 
 
 def replication(module):
@@ -188,7 +198,7 @@ def _user(text):
     if text == "fastest":
         return text
     try:
-        return tuple(map(float, text.split(","))) if text.count(",") == 1 else int(text)
+        return tuple(map(number, text.split(","))) if text.count(",") == 1 else whole(text)
     except ValueError:
         rule = "fastest, a place X,Y in m, or a number"
         raise argparse.ArgumentTypeError(f"WHO must be {rule}, got {text!r:.60}") from None

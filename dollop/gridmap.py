@@ -121,7 +121,7 @@ class OccupancyGrid:
         Raises
         ------
         ValueError
-            If the grid would have more than 25 million cells or not lie within 1e9 m of the origin,
+            If the grid would have more than 20 million cells or not lie within 1e9 m of the origin,
             if `max_range` is no length, or `resolution` is not from 1 mm to 1 km.
 
         Notes

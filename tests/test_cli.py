@@ -163,9 +163,19 @@ def test_a_closed_pipe_ends_a_command_without_a_traceback(room):
     assert len(pd.read_csv("user.csv")) > 100 and (room / "user.png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("arguments", [["--user", "bob"], ["--user", "1;2"], ["--stride", "0.6"]])
+NO_USAGE = [
+    ["--user", "bob"],
+    ["--user", "1;2"],
+    ["--user", "1_0"],
+    ["--min-area", "0_1"],
+    ["--fov", "1_8"],
+    ["--a", "b"],
+]
+
+
+@pytest.mark.parametrize("arguments", NO_USAGE)
 def test_what_is_no_usage_ends_with_status_2(arguments, tmp_path, monkeypatch, capsys):
-    """A user that is neither word, place nor number; an option that there is not any more."""
+    """A user that is neither word, place nor number; numbers as only Python writes them; no such option."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as end:
         main(["observe", EIGHTS, LAB, *arguments])

@@ -101,7 +101,7 @@ def test_beams_without_return_clear_up_to_the_maximum_range():
 def test_oversized_grid_is_refused():
     """A pose so far astray that it asks for billions of cells is an error; it tells the size."""
     log = replace(room_log([(0, 0, 0), (1, 1, 0)]), poses=[(0, 0, 0), (400, 400, 0)])
-    with pytest.raises(ValueError, match=r"^80\d\d x 80\d\d cells are more than 25000000"):
+    with pytest.raises(ValueError, match=r"^80\d\d x 80\d\d cells are more than 20000000"):
         OccupancyGrid.from_log(log)
 
 
@@ -311,7 +311,7 @@ def test_a_map_is_refused_before_there_is_room_for_it():
     log = replace(room_log([(0, 0, 0), (1, 1, 0)]), poses=[(0, 0, 0), (490, 490, 0)])
     tracemalloc.start()
     try:
-        with pytest.raises(ValueError, match="cells are more than 25000000, the most that a map has"):
+        with pytest.raises(ValueError, match="cells are more than 20000000, the most that a map has"):
             OccupancyGrid.from_log(log)
         assert tracemalloc.get_traced_memory()[1] < 1_000_000
     finally:

@@ -40,7 +40,7 @@ def read_map(path):
     Parameters
     ----------
     path : str or Path
-        The map, of at most 25 million cells, its comment lines in the first 64 KiB.
+        The map, of at most 20 million cells, its comment lines in the first 64 KiB.
 
     Returns
     -------

@@ -40,8 +40,8 @@ MAX_LINES, MAX_LINE = 2_000_000, 1 << 20
 MOST_PACKED, UNPACKED = 100, 1 << 20
 """How many times its size a packed text may unpack to, and bytes from which on that counts:
 messages differ in their times and readings, and gzip packs what does not a thousand times."""
-MAX_CELLS = 25_000_000
-"""Cells of a map, or pixels of its picture: 250 m x 250 m at 5 cm, which take a gigabyte."""
+MAX_CELLS = 20_000_000
+"""Cells of a map, or pixels of its picture: 220 m x 220 m at 5 cm; making one takes 0.9 GB."""
 MAX_JSON, MAX_VALUES = 64 << 20, 1_000_000
 """Bytes and values of a JSON file: a task of an hour's walks in a hall, many times over."""
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
@@ -369,7 +369,7 @@ def check_cells(columns, rows):
     Raises
     ------
     ValueError
-        If they are more than 25 million in all.
+        If they are more than 20 million in all.
     """
     if not columns * rows <= MAX_CELLS:
         cells = f"{columns:.12g} x {rows:.12g} cells"

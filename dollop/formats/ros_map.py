@@ -143,7 +143,7 @@ def read_map(path):
     ----------
     path : str or Path
         The YAML, of at most 64 KiB and 1000 nodes, without anchors, aliases and tags; its picture
-        is a PGM or a PNG of at most 128 MiB and 25 million pixels.
+        is a PGM or a PNG of at most 128 MiB and 20 million pixels.
 
     Returns
     -------
