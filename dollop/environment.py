@@ -208,7 +208,23 @@ class Environment:
 
 
 def checked_boxes(boxes):
-    """Boxes (N, 4) in m as a float array of their own; an empty list is none of them."""
+    """Boxes as a float array of their own; an empty list is none of them.
+
+    Parameters
+    ----------
+    boxes : (N, 4) array_like
+        xmin, ymin, xmax, ymax in m.
+
+    Returns
+    -------
+    (N, 4) float array
+        A copy, in m.
+
+    Raises
+    ------
+    ValueError
+        What is not four numbers each, within 1e9 m of the origin.
+    """
     shape = np.shape(boxes) if isinstance(boxes, np.ndarray) else ()
     none = shape[:1] == (0,) or (isinstance(boxes, list | tuple) and not boxes)
     return checked_positions("boxes", np.empty((0, 4)) if none else boxes, "N", 4)

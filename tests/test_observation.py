@@ -468,7 +468,7 @@ BAD = {
     "pose": ((9.0, np.ones(181), [np.nan, 0, 0]), "pose must be finite, got nan"),
     "older": ((0.5, np.ones(181), SENSOR), r"t must be later than the last scan's 1.0, got 0.5"),
     "as old": ((1.0, np.ones(181), SENSOR), r"t must be later than the last scan's 1.0, got 1.0"),
-    "no time": ((np.nan, np.ones(181), SENSOR), "t must be a finite number, got .*nan"),
+    "no time": ((np.nan, np.ones(181), SENSOR), "t must be in -1e.11 to 1e.11, got nan"),
     "negative": ((9.0, np.full(181, -0.5), SENSOR), "must not be negative or NaN, got -0.5"),
     "none": ((9.0, np.full(181, np.nan), SENSOR), "must not be negative or NaN, got nan"),
     "beams": ((9.0, np.ones(180), SENSOR), r"ranges must have shape \(181,\), got \(180,\)"),

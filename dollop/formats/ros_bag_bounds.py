@@ -85,17 +85,28 @@ def _check_metadata(path):
 
 
 def _check_records(path, stream, size):
-    """Records of a ROS 1 bag: head and content, each after its length."""
+    """Records of a ROS 1 bag: head and content, each after its length; the index is where one begins."""
+    places = {size}
     while (place := stream.tell()) < size:
+        places.add(place)
         for _ in range(2):
             length = int.from_bytes(stream.read(4), "little")
             if stream.seek(length, 1) > size:
                 raise FormatError(f"a record at byte {place} runs past the end of the file", path)
+    stream.seek(len(BAG))
+    _, _, index = stream.read(200).partition(b"index_pos=")
+    if int.from_bytes(index[:8], "little") not in places:
+        raise FormatError("the index must be where a record begins", path)
 
 
 def _check_mcap(path, stream, size):
-    """Records of an mcap file: what they are, their length and their content."""
+    """Records of an mcap file: what they are, their length and their content; the index is where some begin."""
+    stream.seek(max(size - len(MCAP) - 20, 0))
+    footer, summary = size - len(MCAP) - 29, int.from_bytes(stream.read(8), "little")
+    stream.seek(len(MCAP))
+    missed = {footer, summary} - {0}  # of a file without a summary
     while (place := stream.tell()) + 9 <= size - len(MCAP):
+        missed.discard(place)
         kind, length = struct.unpack("<BQ", stream.read(9))
         if length > size - stream.tell():
             found = f"a record of {length} bytes at byte {place}"
@@ -104,6 +115,8 @@ def _check_mcap(path, stream, size):
             _check_chunk(path, stream.read(length))
         else:
             stream.seek(length, 1)
+    if missed:
+        raise FormatError("the index must be where a record begins, and a footer at the end", path)
 
 
 def _check_chunk(path, chunk):

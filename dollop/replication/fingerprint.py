@@ -122,7 +122,12 @@ def _tree(path):
 
 def _is_prose(node):
     """Whether a statement is a text that stands for itself: of a module, a function or a constant."""
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+    return isinstance(node, ast.Expr) and _is_text(node.value)
+
+
+def _is_text(node):
+    """Whether an expression is a text that stands there."""
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)
 
 
 def _is_claim(node):
@@ -143,7 +148,7 @@ def _digest(path):
 def _named_beside(tree, path):
     """Files beside a module whose names stand in it, such as "chosen.json"."""
     beside = {each.name: each for each in path.parent.iterdir() if each.suffix not in (".py", ".pyc")}
-    named = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    named = {node.value for node in ast.walk(tree) if _is_text(node)}
     return {beside[name] for name in named & set(beside) if beside[name].is_file()}
 
 

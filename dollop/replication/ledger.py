@@ -38,8 +38,8 @@ WRITING, PRESENT, SEEDS = 0, 1, 2
 class Ledger:
     """What stands in a table of jobs, and where.
 
-    A line holds the values of its columns as in any CSV file, and the first digits of the SHA-256 of
-    that in the last column, `check`. A line that was cut short or altered is not believed.
+    A line holds the values of its columns as in any CSV file, and the first digits of the SHA-256
+    of that in the last column, `check`. A line that was cut short or altered is not believed.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ class Shared:
         return latest
 
     def _opened(self):
-        """The lock file, held: one that is still there, not one that somebody has just taken along."""
+        """The lock file, held: one that is still there, which nobody has just taken along."""
         while True:
             self._lock = os.open(self._lock_path, os.O_RDWR | os.O_CREAT, 0o666)
             self._hold(PRESENT, shared=True)
@@ -339,7 +339,7 @@ class Shared:
 
 
 def _append(table, header, lines):
-    """Add lines to an open table, on a line of their own whatever a killed run has left before them."""
+    """Add lines to an open table, beginning a line whatever a killed run has left before them."""
     if os.pread(table, len(header), 0) != header:
         raise ValueError("is no longer the table that it was; what was found is not written over it")
     if os.pread(table, 1, os.fstat(table).st_size - 1) != b"\n":

@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from collections import Counter, deque
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from functools import partial
 
@@ -31,7 +31,7 @@ ALONE = 2
 """How often a job that has killed its worker is tried again, alone, before it is set aside."""
 
 ATTEMPTS = 10
-"""Over how many jobs in a row workers may die before the study gives up: then it is not the jobs."""
+"""Over so many jobs in a row workers die before the study gives up: then it is not the jobs."""
 
 POLL = 1.0
 """s between two looks at the clock, and at seeds that another study has taken."""
@@ -49,13 +49,13 @@ WHOLE = "dollop.replication.study"
 def run_all(ledger, jobs, answers, stamp, work, scheduler=None, workers=-1):
     """Do the jobs that a table has no answer to, and add each to it as soon as it is done.
 
-    The jobs of a seed follow each other in one worker, which makes what they share once. A seed that
-    another study in the same folder is at is left to that, and done only if it does not get done
-    there. When a worker dies, its job is tried again alone, when all others are done, and set aside
-    when it has killed alone twice; one without an end after 600 s is set aside at once. A Dask cluster
-    gets a seed whole, tries again by itself, and gets what it gives up job by job; it cannot be made
-    to stop. What is set aside has a line in the table that says why, and is tried again when the study
-    is run again.
+    The jobs of a seed follow each other in one worker, which makes what they share once. A seed
+    that another study in the same folder is at is left to that, and done only if it does not get
+    done there. When a worker dies, its job is tried again alone, when all others are done, and set
+    aside when it has killed alone twice; one without an end after 600 s is set aside at once. A
+    Dask cluster gets a seed whole, tries again by itself, and gets what it gives up job by job; it
+    cannot be made to stop. What is set aside has a line in the table that says why, and is tried
+    again when the study is run again.
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ def run_all(ledger, jobs, answers, stamp, work, scheduler=None, workers=-1):
     Raises
     ------
     RuntimeError
-        If jobs were set aside, which are named; or if workers died over one job after the other. All
-        that was done is in the table.
+        If jobs were set aside, which are named; or if workers died over one job after the other.
+        All that was done is in the table.
     """
     with ledger.shared() as table:
         before, damaged = table.read()
@@ -114,7 +114,7 @@ def _say(text):
 
 
 def _tried(work, jobs):
-    """What becomes of jobs, in the worker: their columns or None, and the reason if there are none."""
+    """What becomes of jobs, in the worker: of each its columns or None, and the reason if none."""
     return [_one_tried(work, job) for job in jobs]
 
 
@@ -156,7 +156,7 @@ class _Course:
                     self.give_up(lane.ended(renew=True), f"no end after {LIMIT:g} s")
 
     def fill(self, lanes):
-        """Give every lane that waits its next job; one that has killed a worker only when all others are done."""
+        """Give every lane that waits its next job; one that has killed a worker when no other is left."""
         for lane in lanes:
             if not lane.future and not lane.jobs:
                 lane.jobs.extend(self.begin_seed())
@@ -263,7 +263,12 @@ class _Lane:
             jobs, self.jobs = self.jobs[:n], self.jobs[n:]
         self.executor = self.executor or self.open()
         self.under_way, self.began = jobs, time.monotonic()
-        self.future = self.executor.submit(work, jobs)
+        try:
+            self.future = self.executor.submit(work, jobs)
+        except BrokenExecutor:  # the worker died while it had nothing to do
+            self.close(self.kill)
+            self.executor = self.open()
+            self.future = self.executor.submit(work, jobs)
 
     def late(self):
         """Whether the jobs have taken longer than any may."""
@@ -326,7 +331,7 @@ def _end_with(parent):
 
 
 def _on_cluster(scheduler, stack):
-    """A lane for each thread of a Dask cluster. None is bound to a worker: Dask would wait for a dead one."""
+    """A lane for each thread of a Dask cluster, bound to none: Dask would wait for a dead one."""
     need("cluster")
     from distributed import Client
 

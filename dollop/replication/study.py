@@ -1,10 +1,10 @@
 """The study behind REPLICATION.md: every claim over many seeds, on all cores or a Dask cluster.
 
 Results go into one table, study/results.csv: a line per claim and seed, with its numbers, the
-fingerprints of the code and of the criteria that made them, and a checksum. It is added to whenever
-an experiment is done, by as many studies at a time as there are, and an interrupted study goes on
-where it was. From the table come claims.json, and with it the table of claims in REPLICATION.md; and
-study/golden.json, the numbers of one seed that any machine must find again.
+fingerprints of the code and of the criteria that made them, and a checksum. It is added to
+whenever an experiment is done, by as many studies at a time as there are, and an interrupted study
+goes on where it was. From the table come claims.json, and with it the table of claims in
+REPLICATION.md; and study/golden.json, the numbers of one seed that any machine must find again.
 """
 
 import sys
@@ -85,8 +85,8 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
     """Fill the table with what is missing in it, claim by claim of a seed.
 
     Numbers count that code of today has made, which has the same fingerprint; others are made anew.
-    They count as well if a criterion has been changed since, as long as all those are there that are
-    asked for: then that is said, for a criterion should stand before the numbers that judge it.
+    They count as well if a criterion has been changed since, as long as all those are there that
+    are asked for: then that is said, for a criterion should stand before the numbers it judges.
 
     Parameters
     ----------

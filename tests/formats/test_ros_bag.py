@@ -425,11 +425,18 @@ def test_records_that_run_past_the_end_are_refused(tmp_path):
     path.write_bytes(content[:13] + b"\xff\xff\xff\x7f" + content[17:])
     with pytest.raises(FormatError, match="a record at byte 13 runs past the end of the file"):
         read_log(path)
+    path.write_bytes(content.replace(b"index_pos=", b"index_pos=\1", 1))
+    with pytest.raises(FormatError, match="the index must be where a record begins|runs past the end"):
+        read_log(path)
     path = next(write_bag(tmp_path / "b", "mcap", {"/scan": scans_of}).glob("*.mcap"))
     content = path.read_bytes()
     path.write_bytes(content[:9] + b"\xff" * 6 + content[15:])
     with pytest.raises(FormatError, match="a record of 281474976710655 bytes at byte 8 runs past the end"):
         read_log(path)
+    for lie in (b"\1", b"\0\0\0\0\0\1"):
+        path.write_bytes(content[:-28] + lie + content[-28 + len(lie) :])
+        with pytest.raises(FormatError, match="the index must be where a record begins, and a footer at the end"):
+            read_log(path)
 
 
 def test_a_packed_chunk_has_bounds(tmp_path, monkeypatch):

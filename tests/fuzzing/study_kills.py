@@ -24,6 +24,8 @@ from dollop.replication.running import run_all
 CLAIMS = "one", "two", "three"
 WORKERS = 2
 CODE = "0123456789ab"
+OWN = "marks", "marks.txt", "results.csv"
+"""Files of the harness itself, and the table."""
 
 
 def ledger_in(folder):
@@ -64,7 +66,15 @@ def start(folder, first, last, wait=0.02):
     """The toy study in a process of its own."""
     (Path(folder) / "marks").mkdir(exist_ok=True)
     call = [sys.executable, __file__, "--run", str(folder), str(first), str(last), str(wait)]
-    return subprocess.Popen(call, stderr=subprocess.DEVNULL)
+    with open(Path(folder) / "marks.txt", "ab") as told:
+        return subprocess.Popen(call, stderr=told)
+
+
+def is_fair_end(study, folder):
+    """Whether a study ended as it may: well, killed, or with a job set aside whose worker was killed three times."""
+    if study.returncode == 1:
+        return "killed its worker 3 times" in (Path(folder) / "marks.txt").read_text().splitlines()[-1]
+    return study.returncode in (0, -signal.SIGKILL)
 
 
 def children(pid):
@@ -124,7 +134,8 @@ def killed_study(folder, kills, seed, n_seeds=30, at_once=1):
     -------
     dict
         "kills", "lost" rows, jobs "repeated" beyond the first time, and the most that may be,
-        "torn" lines that were found, "missing" jobs at the end, and files "left" beside the table.
+        "torn" lines that were found, "missing" jobs at the end, files "left" beside the table, and
+        studies that set jobs "aside" which were killed three times.
     """
     rng = np.random.default_rng(seed)
     done, lost, torn, spent = set(), set(), 0, 0
@@ -138,7 +149,7 @@ def killed_study(folder, kills, seed, n_seeds=30, at_once=1):
             time.sleep(0.05)
             continue
         for study in ended:  # all is done: there must be more to do for what is killed
-            assert study.returncode in (0, -signal.SIGKILL), study.returncode
+            assert is_fair_end(study, folder), (Path(folder) / "marks.txt").read_text()[-2000:]
             last += n_seeds if study.returncode == 0 and study is ended[0] else 0
             studies[studies.index(study)] = start(folder, first, last)
         wait_for_work(folder, rng)
@@ -160,11 +171,12 @@ def killed_study(folder, kills, seed, n_seeds=30, at_once=1):
     assert last_study.wait() == 0
     now, _ = done_in(folder)
     marks = len(list((Path(folder) / "marks").iterdir()))
-    left = sorted(path.name for path in Path(folder).iterdir() if path.name not in ("marks", "results.csv"))
+    left = sorted(path.name for path in Path(folder).iterdir() if path.name not in OWN)
     wanted = set(jobs_of(range(first, last)))
     return {
         "kills": spent, "jobs": len(wanted), "lost": len(lost | (done - now)), "missing": len(wanted - now),
         "repeated": marks - len(wanted), "allowed": allowed, "torn": torn, "left": left,
+        "aside": (Path(folder) / "marks.txt").read_text().count("jobs were set aside"),
     }  # fmt: skip
 
 

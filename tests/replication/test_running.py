@@ -1,6 +1,7 @@
 """Running jobs: killed at any moment, several studies at once, jobs without an end; nothing is lost or done twice."""
 
 import os
+import signal
 import time
 
 import pytest
@@ -30,7 +31,7 @@ def test_four_studies_in_one_folder_share_the_work(tmp_path):
     assert [study.wait() for study in studies] == [0, 0, 0, 0]
     assert done_in(tmp_path) == (set(jobs_of(range(30))), 0)
     assert marks_in(tmp_path) == 90
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["marks", "results.csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["marks", "marks.txt", "results.csv"]
 
 
 def test_rows_of_other_code_and_damaged_ones_are_made_anew(tmp_path, capsys):
@@ -65,6 +66,25 @@ def test_a_job_without_an_end_is_set_aside(tmp_path, monkeypatch):
         run_all(ledger_in(tmp_path), jobs, answers, lambda job: {"code": CODE}, never_ending, workers=2)
     rows, _ = ledger_in(tmp_path).read()
     assert [row["seed"] for row in rows if answers(row)] == ["0", "2", "3"]
+
+
+def own_id(jobs):
+    """The worker's number."""
+    return os.getpid()
+
+
+def test_a_worker_that_dies_with_nothing_to_do_costs_nothing():
+    """Another takes its place, and the next job is done there."""
+    with running._lanes(None, 1) as (lane,):
+        lane.start(own_id, [("one", "0")])
+        first = lane.future.result()
+        lane.ended()
+        broken = lane.executor._flags
+        os.kill(first, signal.SIGKILL)
+        while broken.broken is None:
+            time.sleep(0.01)
+        lane.start(own_id, [("one", "1")])
+        assert lane.future.result() != first
 
 
 def lethal(job):

@@ -253,6 +253,18 @@ def test_a_study_of_worlds_goes_on_where_it_was(tmp_path, fake, monkeypatch):
     assert both.loc[4:7].equals(first)
 
 
+def test_a_world_without_its_numbers_is_not_believed(tmp_path, fake):
+    """Nor one with an outcome that there is not; a summary of none is refused."""
+    ledger = survey.ledger_at(tmp_path / "worlds.csv")
+    row = survey.run_survey(range(1), ledger.path, jobs=0).iloc[0].to_dict() | {"code": ""}
+    for wrong in ({"draws": ""}, {"covered": "much"}, {"collisions": "inf"}, {"outcome": "lost"}):
+        with ledger.shared() as table:
+            table.append(row | {"seed": "7"} | wrong)
+    assert ledger.read()[1] == 4
+    with pytest.raises(ValueError, match="a summary needs a world"):
+        survey.summary(survey.as_table([]))
+
+
 def test_the_summary_counts_by_kind_and_cause(tmp_path, fake):
     """Ends add up to the worlds of each kind, causes are counted in every world that has them, the first apart."""
     table = survey.run_survey(range(33), tmp_path / "worlds.csv", jobs=0)
@@ -277,7 +289,7 @@ def test_the_worst_come_first(tmp_path, fake):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("seed,kind\n1,plain\n", "columns must be"), ("", "not a table of worlds")]
+    ("text", "message"), [("seed,kind\n1,plain\n", "begins with the line seed,kind"), ("", "the file is empty")]
 )
 def test_a_table_that_is_none_is_refused(tmp_path, text, message):
     """A damaged table is told with its name, and nothing is written over it."""
@@ -370,7 +382,8 @@ def test_the_command_writes_table_summary_and_pictures(tmp_path, fake, monkeypat
     told = capsys.readouterr().out
     for name in ("REPLICATION.md", "study/worlds.csv", "study/worlds.json", "study/worlds_worst.png"):
         assert (tmp_path / name).exists() and str(tmp_path / name) in told
-    first = (folder / "worlds.csv").read_text().replace("0,plain,right", "0,plain,silently wrong")
-    (folder / survey.FIRST).write_text(first)
+    rows, _ = survey.ledger_at(folder / "worlds.csv").read()
+    with survey.ledger_at(folder / survey.FIRST).shared() as table:
+        table.append(rows[0] | {"outcome": "silently wrong"}, *rows[1:])
     main(["study", "worlds", "--folder", str(folder)])
     assert "| **all** | 12 | 4 | 4 | 0 | 4 | 0 | 5 |\n" in report.read_text()

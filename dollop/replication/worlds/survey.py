@@ -1,9 +1,9 @@
 """The study of random worlds behind "Outside the paper's room" in REPLICATION.md: `dollop study worlds`.
 
-One line for each seed goes into study/worlds.csv, with the fingerprint of the code that made it and a
-checksum. It is added to after every world, by as many studies at a time as there are, and an interrupted
-study goes on where it was. From the table come worlds.json, the summary by kind; a sheet of pictures of
-the worst worlds; and the tables in the report.
+One line for each seed goes into study/worlds.csv, with the fingerprint of the code that made it and
+a checksum. It is added to after every world, by as many studies at a time as there are, and an
+interrupted study goes on where it was. From the table come worlds.json, the summary by kind; a sheet
+of pictures of the worst worlds; and the tables in the report.
 """
 
 from collections import Counter
