@@ -55,6 +55,7 @@ NUMBERS, RECORDS = "numbers and arrays", "in place of records"
 MAY = {
     "ranges": (np.inf,), "occupancy": (np.nan,), "directions": (np.nan,), "measurements": (np.nan,),
     "probability": (np.nan,), "margin": (np.inf,), "first": (np.inf, np.nan),
+    "Run.clearance": (np.inf, np.nan), "Run.poses": (np.inf, np.nan), "Run.true_poses": (np.inf, np.nan),
     "gate": (np.inf,), "gate_min": (np.inf,), "gate_max": (np.inf,), "disappear_after": (np.inf,),
 }  # fmt: skip
 """Fields in which other than finite numbers mean something, by what they mean."""
@@ -424,7 +425,8 @@ def check_result(value, may=(), name="the result", depth=0):
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
         for field in dataclasses.fields(value):
             inner = f"{type(value).__name__}.{field.name}"
-            check_result(getattr(value, field.name), MAY.get(field.name, may), inner, depth + 1)
+            allowed = MAY.get(inner, MAY.get(field.name, may))
+            check_result(getattr(value, field.name), allowed, inner, depth + 1)
     elif isinstance(value, dict):
         check_result(list(value.values()), may, name, depth)
     elif isinstance(value, list | tuple):
