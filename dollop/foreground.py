@@ -23,6 +23,8 @@ THROUGH = 0.25
 """m by which a beam must have gone on behind a place on the map to have gone through it."""
 FLOOR_EVERY, FARTHEST_SEEN = 1.0, 20.0
 """s: the floor is looked at no more often; and m up to which a beam is believed to have seen it."""
+MOST_FLOOR = 5_000_000
+"""Cells of the floor, of 10 cm on a map of 200 m x 200 m; on a larger one they are larger."""
 SLOT = 0.15
 """s: what stands is looked at no more often, however fast the laser is."""
 LONGEST_STEP = 0.5
@@ -689,7 +691,7 @@ class SeenFloor:
     background : OccupancyGrid
         Of its extent.
     resolution : float
-        m per cell.
+        m per cell; larger where the floor would have more than five million cells.
 
     Attributes
     ----------
@@ -702,11 +704,12 @@ class SeenFloor:
     """
 
     def __init__(self, background, resolution=0.10):
-        self.origin, self.resolution = background.origin, resolution
-        size = np.multiply(background.occupancy.shape, background.resolution / resolution)
+        extent = np.multiply(background.occupancy.shape, background.resolution)
+        self.origin, self.resolution = background.origin, max(resolution, np.sqrt(extent.prod() / MOST_FLOOR))
+        size = np.multiply(background.occupancy.shape, background.resolution / self.resolution)
         self.shape = tuple(np.ceil(size).astype(int))
         row, column = np.indices(self.shape).reshape(2, -1)
-        self._centres = np.column_stack(in_metres(column + 0.5, row + 0.5, self.origin, resolution))
+        self._centres = np.column_stack(in_metres(column + 0.5, row + 0.5, self.origin, self.resolution))
         self._numbers = np.arange(len(self._centres)).reshape(self.shape)
         self.first = np.full(len(self._centres), np.inf)
         self.last, self._farthest = None, 0.0

@@ -214,6 +214,10 @@ class Task:
             objects=objects,
             learned=checked_records("learned", self.learned, Way),
         )
+        gone = {k for way in self.learned for k in way.members}
+        lost = [k for k, each in enumerate(self.partners) if each is not None and k not in gone]
+        if self.learned and lost:
+            raise ValueError(f"a demonstration must go one of the ways or be set aside, got number {lost[0]}")
 
     def __repr__(self):
         shown, subgoals = len(self.demonstrations), len(self.law.segments)

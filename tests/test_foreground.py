@@ -359,6 +359,13 @@ def test_the_floor_is_seen_where_beams_pass_and_end():
     assert floor.first_at(places).tolist() == [7.0, 7.0, 7.0, np.inf, 8.0, np.inf]
 
 
+def test_the_floor_of_a_large_map_has_larger_cells():
+    """Five kilometres of cells of a metre are no fifty thousand of ten centimetres along each side."""
+    floor = SeenFloor(OccupancyGrid(np.zeros((4000, 5000)), (0.0, 0.0), 1.0))
+    assert floor.first.size < 5_100_000 and floor.resolution == pytest.approx(2.0)
+    assert SeenFloor(room()).resolution == 0.10
+
+
 def test_the_floor_keeps_when_it_was_seen_first():
     """A second look adds what is new, and changes no time; looks come no more often than once a second."""
     floor, near, far = SeenFloor(room()), np.array([[4.0, 2.0]]), np.array([[4.0, 5.0]])

@@ -1,6 +1,7 @@
 """Sec. IV-B and V: tasks adapt to moved objects, are learned from several demonstrations, saved and loaded."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -398,6 +399,13 @@ def test_nothing_to_learn_from():
     turned = Environment([[4.3, 1.4, 4.7, 1.8], [4.3, 5.4, 4.7, 5.8]])
     with pytest.raises(ValueError, match="no demonstration can be learned from: demonstration 0 and .* confidence"):
         learn([Demonstration(eight(), turned)], Environment(CANS))
+
+
+def test_every_demonstration_goes_a_way_or_is_set_aside():
+    """A task whose ways are not those of one of its demonstrations contradicts itself."""
+    task = learn([Demonstration(eight(), Environment(CANS))])
+    with pytest.raises(ValueError, match="must go one of the ways or be set aside, got number 1"):
+        replace(task, demonstrations=2 * task.demonstrations, partners=2 * task.partners)
 
 
 @pytest.mark.parametrize("method", ["anchored", "paper"])

@@ -148,15 +148,17 @@ def _opened(path):
         kind = "a folder" if os.path.isdir(path) else "a device or a pipe"
         raise FormatError(f"must be an ordinary file, and is {kind}", path)
     with open(path, "rb") as stream:
-        zipped = stream.read(2) == b"\x1f\x8b"
-        stream.seek(0)
         try:
+            zipped = stream.read(2) == b"\x1f\x8b"
+            stream.seek(0)
             yield (
                 io.BufferedReader(gzip.GzipFile(fileobj=stream), PIECE) if zipped else stream,
                 os.fstat(stream.fileno()).st_size,
             )
         except (EOFError, gzip.BadGzipFile, zlib.error) as error:
             raise FormatError(f"gzip data cut short or damaged ({error})", path) from None
+        except OSError as error:
+            raise FormatError(f"cannot be read to its end ({error.strerror})", path) from None
 
 
 def read_bytes(path, most=MAX_BYTES):

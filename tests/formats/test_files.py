@@ -165,6 +165,13 @@ def test_what_is_no_ordinary_file_is_refused(tmp_path, kind):
         read_bytes(tmp_path / "nothing")
 
 
+@pytest.mark.skipif(not os.path.exists("/proc/self/mem"), reason="a file of Linux")
+def test_a_file_that_breaks_off_in_reading_is_named():
+    """As a map whose picture is /proc/self/mem, or a file on a failing disk."""
+    with pytest.raises(FormatError, match="^/proc/self/mem: cannot be read to its end"):
+        read_bytes("/proc/self/mem")
+
+
 # ---- JSON by its letter, and numbers as they are written
 
 

@@ -257,10 +257,11 @@ def test_a_world_without_its_numbers_is_not_believed(tmp_path, fake):
     """Nor one with an outcome that there is not; a summary of none is refused."""
     ledger = survey.ledger_at(tmp_path / "worlds.csv")
     row = survey.run_survey(range(1), ledger.path, jobs=0).iloc[0].to_dict() | {"code": ""}
-    for wrong in ({"draws": ""}, {"covered": "much"}, {"collisions": "inf"}, {"outcome": "lost"}):
+    wrongs = {"draws": ""}, {"draws": "9" * 5000}, {"covered": "much"}, {"collisions": "inf"}, {"outcome": "lost"}
+    for wrong in wrongs:
         with ledger.shared() as table:
             table.append(row | {"seed": "7"} | wrong)
-    assert ledger.read()[1] == 4
+    assert ledger.read()[1] == 5
     with pytest.raises(ValueError, match="a summary needs a world"):
         survey.summary(survey.as_table([]))
 

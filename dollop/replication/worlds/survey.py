@@ -87,7 +87,8 @@ def is_sound(row):
     if not is_done(row):
         return row["told"].startswith(NOT_DONE)
     try:
-        return all(isfinite(float(row[name] or 0)) for name in NUMBERS) and row["draws"].isdecimal()
+        counted = row["draws"].isdecimal() and len(row["draws"]) < 10
+        return counted and all(isfinite(float(row[name] or 0)) for name in NUMBERS)
     except ValueError:
         return False
 
