@@ -13,7 +13,7 @@ import calls
 import kinds
 from watch import watch_all, watched
 
-SEED, FILES, BAGS, CALLS = 0, 120, 40, 400
+SEED, FILES, BAGS, CALLS = 0, 60, 20, 200
 """How many files of each kind, fewer of bags, which take longer to read, and calls of each."""
 
 
