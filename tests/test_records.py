@@ -309,6 +309,8 @@ def test_what_hostile_calls_found_stays_mended():
     lost = SimpleNamespace(pose=1.0, localised=False, limits=PIONEER_LIMITS, period=0.1, drive=print)
     with pytest.raises(ValueError, match=r"the robot's pose must have shape \(3,\), got \(\)"):
         dollop.perform(TASK, lost)
+    with pytest.raises(ValueError, match="demonstration 0 must hold at most 1000 subgoals, got 20000"):
+        dollop.SubgoalHMM.fit([np.zeros((20_000, 2))])
     with pytest.raises(ValueError, match="sequences must be at most 100000"):
         dollop.SubgoalHMM.fit(np.broadcast_to(1.0, (10**9, 2)))
 

@@ -41,11 +41,10 @@ from dollop.checks import (
 __all__ = ["SubgoalHMM"]
 
 LEAST_SPREAD, MOST_SPREAD = 1e-6, 1e6  # m: beyond, the evidence drowns in rounding
-ROUNDING, MOST_EVIDENCE, MOST_VARIANCE = (
-    1e-6,
-    1e18,
-    1e20,
-)  # by which sums may miss 1; nats; m^2, of 1e9 m
+ROUNDING = 1e-6  # by which sums may miss 1
+MOST_EVIDENCE, MOST_VARIANCE = 1e18, 1e20  # nats; m^2, of 1e9 m
+MOST_SUBGOALS = 1000
+"""Of a demonstration: all pairs of two are compared, in seconds and half a gigabyte."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +161,8 @@ class SubgoalHMM:
         Raises
         ------
         ValueError
-            No demonstration, one that is empty, not (K, 2) or not finite, or a spread that is not
-            positive.
+            No demonstration, one that is empty, of more than 1000 subgoals, not (K, 2) or not finite,
+            or a spread that is not positive.
 
         Examples
         --------
@@ -368,4 +367,6 @@ def checked_sequence(sequence, name):
     sequence = checked_positions(name, sequence)
     if not len(sequence):
         raise ValueError(f"{name} must hold at least one subgoal, as (K, 2), got none")
+    if len(sequence) > MOST_SUBGOALS:
+        raise ValueError(f"{name} must hold at most {MOST_SUBGOALS} subgoals, got {len(sequence)}")
     return sequence

@@ -212,6 +212,8 @@ def interval(values, share=False, level=0.95):
         return nan, nan, nan
     mean = values.mean()
     if share:
+        if not 0 <= values.min() <= values.max() <= 1:
+            raise ValueError(f"a share must be in 0 to 1, got {values.min():g} to {values.max():g}")
         ends = stats.binomtest(int(values.sum()), n).proportion_ci(level, "wilson")
         return mean, ends.low, ends.high
     reach = stats.sem(values) * stats.t.ppf((1 + level) / 2, n - 1) if n > 1 else np.inf
