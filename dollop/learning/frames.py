@@ -137,7 +137,7 @@ def frames_like(objects, turning, environment, partners):
     Frames
         In one environment; a frame that turns is absent where the direction is not known.
     """
-    n = objects.max(initial=-1) + 1
+    n = max(objects.max(initial=-1), partners.max(initial=-1)) + 1  # of which some may have no frame
     centres, turns, present = (each[None] for each in _stood(environment, partners, n))
     found = _frames(centres, turns, present, objects, turning, np.full((len(objects), 4, 2), np.nan))
     known = np.isfinite(turns[:, objects[turning]]) if turning.any() else np.ones((1, 0), bool)

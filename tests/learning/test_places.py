@@ -120,3 +120,10 @@ def test_of_many_objects_only_pairs_near_the_way_are_candidates(monkeypatch):
     assert len(every) == alone + 3 * 10 and len(few) == alone + 3 * 3
     assert np.array_equal(few[:alone], every[:alone])
     assert set(np.flatnonzero(few[alone:].any(axis=0))) == {0, 2, 3}
+
+
+def test_objects_without_a_frame_are_passed_over():
+    """A way that follows fewer objects than stand there asks nothing of the others."""
+    environment = Environment([[0, 0, 0.4, 0.4], [4, 0, 4.4, 0.4], [2, 3, 2.4, 3.4]])
+    found = frames_like(np.array([0, -1]), np.zeros(2, bool), environment, np.array([1, 0, 2]))
+    np.testing.assert_allclose(found.origins[0], [[4.2, 0.2], [0.0, 0.0]])
