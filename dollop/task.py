@@ -21,6 +21,7 @@ from dollop.checks import (
     trusted,
 )
 from dollop.environment import Environment
+from dollop.formats.files import check_json
 from dollop.formats.kinds import TASK
 from dollop.formats.writing import whole_file
 from dollop.laps import cut_laps
@@ -395,10 +396,13 @@ class Task:
         ------
         OSError
             Where the file cannot be written, or what is there is not a task.
+        ValueError
+            If it is more than `load` would read: 64 MiB, or 4 million numbers.
         """
         with whole_file(path, "w", TASK) as stream:
-            json.dump(as_dict(self), stream, indent=1, default=np.ndarray.tolist)
-            stream.write("\n")
+            text = json.dumps(as_dict(self), indent=1, default=np.ndarray.tolist) + "\n"
+            check_json("a task that can be read again", text.encode())
+            stream.write(text)
 
     @classmethod
     def load(cls, path):

@@ -6,6 +6,7 @@ log began.
 """
 
 import gzip
+import os
 from contextlib import nullcontext
 from functools import lru_cache, partial
 
@@ -42,6 +43,10 @@ PER_DEGREE = {180: 1, 181: 1, 360: 2, 361: 2, 400: 4, 401: 4}
 
 LARGEST = 1e10
 """No number of a message is larger: seconds since 1970 are as many in the year 2286."""
+
+MOST_PACKED, UNPACKED = 100, 1 << 20
+"""How many times the size of a file the lines may be, unpacked, that are passed over, and bytes from
+which on that counts: what is read has a bound of its own."""
 
 SICK_TYPES, UNKNOWN_TYPE = (0, 1), 99
 """`laser_type` of the SICK LMS and PLS, and of a laser CARMEN has no name for."""
@@ -157,9 +162,13 @@ def _messages(path, parsers):
     Of several names the first that a good message has is read from there on, and no other.
     """
     found = {name: ({}, {}) for name in parsers}
-    names, room = tuple(found), MAX_READINGS
+    names, room, other = tuple(found), MAX_READINGS, UNPACKED + MOST_PACKED * os.path.getsize(path)
     for number, line in enumerate(read_lines(path), 1):
         if not line.lstrip().startswith(names):
+            other -= len(line)
+            if other < 0:
+                rule = f"{MOST_PACKED} times the size of the file is the most that is read"
+                raise FormatError(f"lines that are passed over: {rule}", path, number)
             continue
         fields = line.replace(b"_", b"__").split()  # of one within a number Python is tolerant
         name = fields[0]

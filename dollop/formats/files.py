@@ -22,6 +22,7 @@ __all__ = [
     "FormatError",
     "check_cells",
     "check_fields",
+    "check_json",
     "from_file",
     "of_file",
     "read_bytes",
@@ -37,12 +38,9 @@ PIECE = 1 << 18
 """Bytes that are read at once, so that no more room is taken than the file needs."""
 MAX_LINES, MAX_LINE = 2_000_000, 1 << 20
 """Lines of a log, and bytes of one: five hours of a hundred messages a second, of many readings."""
-MOST_PACKED, UNPACKED = 100, 1 << 20
-"""How many times its size a packed text may unpack to, and bytes from which on that counts:
-messages differ in their times and readings, and gzip packs what does not a thousand times."""
 MAX_CELLS = 20_000_000
 """Cells of a map, or pixels of its picture: 220 m x 220 m at 5 cm; making one takes 0.9 GB."""
-MAX_JSON, MAX_VALUES = 64 << 20, 1_000_000
+MAX_JSON, MAX_VALUES = 64 << 20, 4_000_000
 """Bytes and values of a JSON file: a task of an hour's walks in a hall, many times over."""
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 """A number as C, YAML and ROS write it."""
@@ -212,18 +210,16 @@ def read_lines(path):
     ------
     FormatError
         As `read_bytes`, and if it is no text, has more than 2 million lines or one of more than a
-        mebibyte, holds more than a gibibyte, or unpacks to more than a hundred times its size.
+        mebibyte, or holds more than a gibibyte.
     """
     total = 0
-    with _opened(path) as (stream, size):
-        most = min(MAX_BYTES, MOST_PACKED * size + UNPACKED)
+    with _opened(path) as (stream, _):
         for number, line in enumerate(iter(partial(stream.readline, MAX_LINE + 1), b""), 1):
             if total < 4096 and b"\0" in line[: 4096 - total]:
                 raise FormatError("binary data, where text is expected", path)
             total += len(line)
-            if total > most:
-                rule = f"{MAX_BYTES} bytes and {MOST_PACKED} times its size are the most that is read"
-                raise FormatError(f"holds {total} bytes or more, unpacked: {rule}", path)
+            if total > MAX_BYTES:
+                raise FormatError(f"holds more than {MAX_BYTES} bytes, the most that is read", path)
             if len(line) > MAX_LINE:
                 rule = f"longer than {MAX_LINE} bytes, the most that is read of a line"
                 raise FormatError(rule, path, number)
@@ -252,18 +248,36 @@ def read_json(path, what):
     Raises
     ------
     FormatError
-        As `read_bytes`, and if it is no JSON, holds more than 64 MiB or more than a million values,
+        As `read_bytes`, and if it is no JSON, holds more than 64 MiB or more than 4 million values,
         NaN or a number that no float holds, or names something twice.
     """
     content = read_bytes(path, MAX_JSON)
-    if sum(map(content.count, (b",", b"[", b"{"))) > MAX_VALUES:
-        rule = f"holds more than {MAX_VALUES} values, the most that is read"
-        raise FormatError(f"not {what}: {rule}", path)
+    from_file(path, check_json, what, content)
     numbers = {"parse_constant": _finite, "parse_float": _finite, "parse_int": _whole}
     try:
         return json.loads(content.decode(), object_pairs_hook=_named_once, **numbers)
     except (ValueError, RecursionError) as error:
         raise FormatError(f"not {what}: {error}", path) from None
+
+
+def check_json(what, content):
+    """Refuse a JSON text that is too long to be read.
+
+    Parameters
+    ----------
+    what : str
+        What it should be, for the error.
+    content : bytes
+
+    Raises
+    ------
+    ValueError
+        If it holds more than 64 MiB, or more than 4 million values.
+    """
+    values = sum(map(content.count, (b",", b"[", b"{")))
+    if len(content) > MAX_JSON or values > MAX_VALUES:
+        rule = f"{MAX_JSON} bytes and {MAX_VALUES} values are the most that is read"
+        raise ValueError(f"not {what}: {rule}, got {len(content)} and {values}")
 
 
 def _finite(text):

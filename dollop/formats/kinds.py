@@ -11,11 +11,11 @@ from dollop.checks import shortened
 
 __all__ = [
     "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "PGM", "PNG", "ROS_MAP", "SCENE", "TASK", "TRAJECTORY",
-    "TRUTH", "Kind", "check_is_nobodys", "check_replaceable",
+    "TRUTH", "Kind", "check_no_map_names", "check_replaceable",
 ]  # fmt: skip
 
-HEAD = 4096
-"""Bytes of a file, packed or not, by which its kind is told: a block of a disk."""
+HEAD = 1 << 16
+"""Bytes of a file, packed or not, by which its kind is told: comments may be long."""
 
 
 class Kind(NamedTuple):
@@ -26,7 +26,7 @@ class Kind(NamedTuple):
     name : str
         With its article, as messages tell it.
     pattern : bytes
-        Regular expression that is found in the first 4 kB of every file of this kind, unpacked.
+        Regular expression that is found in the first 64 kB of every file of this kind, unpacked.
     """
 
     name: str
@@ -39,11 +39,12 @@ _TRUTH = rb"\A(?=.*(?:heading|object_x|laser_x))t(?:," + _MOVING + rb")+\r?\n"
 
 CARMEN_LOG = Kind("a CARMEN log", rb"(?m)\A# CARMEN Logfile|^" + _MESSAGE)
 CARMEN_MAP = Kind("a CARMEN map", rb"\A(?:(?:#.*)?\n)*CARMENMAPFILE")
-ROS_MAP = Kind("a ROS map", rb"(?m)^[{\s]*[\"']?image[\"']?\s*:")
+_IMAGE = rb"(?m)^[{\s]*[\"']?image[\"']?\s*:\s*[\"']?([^\"'#,}\n]*)"
+ROS_MAP = Kind("a ROS map", _IMAGE)
 PGM = Kind("a PGM picture", rb"\AP[25]\s")
 PNG = Kind("a PNG picture", rb"\A\x89PNG\r\n\x1a\n")
-TASK = Kind("a task", rb'\A\s*\{[^{}\[\]]*"format":\s*"dollop task"')
-SCENE = Kind("a scene", rb'\A\s*\{[^{}\[\]]*"format":\s*"dollop scene"')
+TASK = Kind("a task", rb'\A\s*\{(?s:.*)"format":\s*"dollop task"')
+SCENE = Kind("a scene", rb'\A\s*\{(?s:.*)"format":\s*"dollop scene"')
 TRAJECTORY = Kind("a trajectory", rb"\At,x,y,occluded\r?\n")
 EVERYBODY = Kind("a table of everybody's trajectories", rb"\At,x,y,occluded,person\r?\n")
 TRUTH = Kind("the truth of a recording", _TRUTH)
@@ -65,7 +66,7 @@ def check_replaceable(path, kind):
     Raises
     ------
     FileExistsError
-        If the file holds something else; by its first 4 kB, unpacked.
+        If the file holds something else; by its first 64 kB, unpacked.
 
     Examples
     --------
@@ -84,8 +85,8 @@ def check_replaceable(path, kind):
         raise FileExistsError(f"it holds {next(known, 'something else')} and not {kind.name}: {rule}")
 
 
-def check_is_nobodys(picture, of=None):
-    """Refuse the name of a picture that a map beside it names, there or not.
+def check_no_map_names(picture, of=None):
+    """Refuse the name of a picture that another map beside it names, whether the picture is there or not.
 
     Parameters
     ----------
@@ -96,15 +97,14 @@ def check_is_nobodys(picture, of=None):
     Raises
     ------
     FileExistsError
-        If another `.yaml` or `.yml` beside it names it in its first 4 kB.
+        If another `.yaml` or `.yml` beside it names it in its first 64 kB.
     """
-    picture = Path(picture)
-    name = re.escape(os.fsencode(picture.name))
-    names_it = rb"(?m)\bimage\b[^\n]*[\s/\"':]" + name + rb"(?:[\s\"',}#]|\Z)"
-    own = None if of is None else os.path.realpath(of)
-    for other in sorted((*picture.parent.glob("*.yaml"), *picture.parent.glob("*.yml"))):
+    picture, own = os.path.realpath(picture), None if of is None else os.path.realpath(of)
+    folder = Path(picture).parent
+    for other in sorted((*folder.glob("*.yaml"), *folder.glob("*.yml"))):
         readable = other.is_file() and os.access(other, os.R_OK)
-        if readable and os.path.realpath(other) != own and re.search(names_it, _head(other)):
+        named = re.search(_IMAGE, _head(other)) if readable and os.path.realpath(other) != own else None
+        if named and os.path.realpath(folder / os.fsdecode(named[1].strip())) == picture:
             raise FileExistsError(f"it is the picture of the map {shortened(other.name, 80)}: choose another name")
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dollop.checks import checked_array, need
+from dollop.checks import FARTHEST, need
 from dollop.formats.files import FormatError, check_cells, from_file
 from dollop.formats.odometry import Odometry
 from dollop.formats.ros_bag_bounds import bound_chunks, check_bag
@@ -15,8 +15,8 @@ from dollop.formats.scans import (
     Beams,
     Scan,
     check_beams,
-    check_metres,
     doubtful,
+    forgive,
     forgive_disorder,
     no_return_from,
     usable_scans,
@@ -92,11 +92,11 @@ def read_log(path, topic=None):
         (`dollop.formats.scans.usable_scans`), or the poses are guesses.
     """
     with _opened(path) as bag:
-        scans, frame = _scans(path, _messages(path, bag, SCAN, topic))
+        scans, bad, frame = _scans(path, _messages(path, bag, SCAN, topic))
         links, odometry = _links(bag), _driven(bag)
     if not scans:
-        raise FormatError("the topic holds no scan", path)
-    scans, t, notes = usable_scans(path, scans, {})
+        raise FormatError(next(iter(bad.values()), "the topic holds no scan"), path)
+    scans, t, notes = usable_scans(path, scans, bad)
     beams, ranges = scans[0].beams, np.array([scan.ranges for scan in scans])
     if np.array_equal(t, [scan.t for scan in scans]):
         poses, hangs, further = laser_poses(path, links, odometry, frame, t)
@@ -143,8 +143,10 @@ def read_odometry(path, topic=None):
         rows = [_odometry(message) for message in _messages(path, bag, ODOMETRY, topic)]
     if not rows:
         raise FormatError("the topic holds no odometry", path)
-    rows = from_file(path, checked_array, "odometry", rows, "N", 7)
-    from_file(path, check_metres, "odometry", rows[:, 1:3])
+    rows = np.array(rows)
+    broken = {row + 1: "a number that is none" for row in np.flatnonzero(np.isnan(rows).any(axis=1))}
+    forgive(path, broken, len(rows), "messages of odometry")
+    rows = rows[~np.isnan(rows).any(axis=1)]
     rows = rows[forgive_disorder(path, rows[:, 0], "Odometry")]
     return Odometry(rows[:, 0], rows[:, 1:4], rows[:, 5:7])
 
@@ -236,25 +238,28 @@ def _all_of(bag, wanted):
 
 
 def _scans(path, messages):
-    """Scans by their number, and the laser's frame."""
-    scans, frame, room = {}, "", MAX_READINGS
+    """Scans by their number, the reason of each that is broken, and the laser's frame."""
+    scans, bad, frame, room = {}, {}, "", MAX_READINGS
     for number, message in enumerate(messages, 1):
-        scans[number] = from_file(path, _scan, message)
+        try:
+            scans[number] = _scan(message)
+        except ValueError as error:
+            bad[number] = str(error)
         frame, room = message.header.frame_id if number == 1 else frame, room - len(message.ranges)
         if room < 0:
             raise FormatError(f"more than {MAX_READINGS} readings, the most that is read", path)
-    return scans, frame.strip("/")
+    return scans, bad, frame.strip("/")
 
 
 def _scan(message):
     """A message as a scan, what is no measurement as `inf`."""
     with np.errstate(invalid="ignore"):  # a NaN that signals is no measurement either
         ranges = np.array(message.ranges, dtype=float)
-    measured = (ranges >= message.range_min) & (ranges <= message.range_max)
     start, step, reach = map(float, (message.angle_min, message.angle_increment, message.range_max))
+    reach = min(reach, FARTHEST)  # some drivers say as much as a float holds
+    measured = (ranges >= message.range_min) & (ranges <= reach)
     beams = Beams(ranges.size, start, step, reach)
     check_beams(beams)
-    check_metres("a range", np.where(measured & np.isfinite(ranges), ranges, 0))
     return Scan(beams, np.where(measured, ranges, np.inf), (0, 0, 0), _seconds(message.header.stamp))
 
 

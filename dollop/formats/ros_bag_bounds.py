@@ -16,8 +16,8 @@ __all__ = ["MAX_CHUNK", "bound_chunks", "check_bag"]
 
 MAX_CHUNK = 1 << 26
 """Bytes that a chunk may unpack to: rosbag writes 768 KiB, ROS 2 4 MiB; bzip2 packs a gigabyte."""
-MAX_METADATA, MAX_NODES = 1 << 17, 10_000
-"""Bytes and nodes of a bag's metadata.yaml: a hundred topics with their settings."""
+MAX_METADATA, MAX_NODES = 1 << 20, 100_000
+"""Bytes and nodes of a bag's metadata.yaml: a thousand topics with their settings."""
 BAG, MCAP = b"#ROSBAG V2.0\n", b"\x89MCAP0\r\n"
 CHUNK = 6
 """What a record of an mcap file begins with that is a chunk."""
@@ -35,7 +35,7 @@ def check_bag(path):
     ------
     FormatError
         Where a record runs past the end of the file, a chunk of an mcap file unpacks to more than
-        64 MiB, or the metadata are larger than 128 KiB, have more than 10,000 nodes, or are refused
+        64 MiB, or the metadata are larger than 1 MiB, have more than 100,000 nodes, or are refused
         by `dollop.formats.plain_yaml.plain_nodes`.
     """
     path = Path(path)
@@ -86,7 +86,7 @@ def _check_metadata(path):
 
 def _check_records(path, stream, size):
     """Records of a ROS 1 bag: head and content, each after its length; the index is where one begins."""
-    places = {size}
+    places = {0, size}  # of a bag that was not closed, of which rosbags says what to do
     while (place := stream.tell()) < size:
         places.add(place)
         for _ in range(2):

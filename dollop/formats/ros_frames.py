@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dollop.checks import Note
+from dollop.checks import FARTHEST, Note
+from dollop.formats.files import from_file
 from dollop.formats.scans import check_metres, doubtful
 from dollop.pose import composed, poses_at
 
@@ -96,17 +97,14 @@ def planar(place, turn):
     x, y, theta, up : float
         In m and rad, and the cosine of the angle between both axes upwards.
 
-    Raises
-    ------
-    ValueError
-        If a number is NaN or beyond 1e9.
+        NaN where a number is NaN or beyond 1e9: who uses it refuses it.
     """
-    q = np.array([turn.x, turn.y, turn.z, turn.w])
-    check_metres("the numbers of a transform", np.array([place.x, place.y, *q]))
-    x, y, z, w = q / max(np.linalg.norm(q), 1e-12)
+    told_ = np.array([place.x, place.y, turn.x, turn.y, turn.z, turn.w], float)
+    across, along, *q = np.where(np.abs(told_) <= FARTHEST, told_, np.nan)
+    x, y, z, w = q / np.maximum(np.linalg.norm(q), 1e-12)
     return (
-        place.x,
-        place.y,
+        across,
+        along,
         np.arctan2(2 * (x * y + z * w), 1 - 2 * (y * y + z * z)),
         1 - 2 * (x * x + y * y),
     )
@@ -143,6 +141,8 @@ def laser_poses(path, links, odometry, frame, t):
         links, notes = _with_odometry(path, links, *odometry, frame)
     chain = _chain(links, frame)
     root = links[chain[-1]].parent if chain else frame
+    for name in chain:
+        from_file(path, check_metres, f"the transforms of {name!r}", links[name].poses)
     if odometry is None and not _told(links, frame):
         text = f"the bag tells no motion of {frame!r}: the laser is taken to stand still at (0, 0, 0)"
         return np.zeros((len(t), 3)), False, (Note("poses", text, doubt=False),)

@@ -160,7 +160,8 @@ def read_map(path):
     FormatError
         If the YAML or its picture is not in order, or each carries the mark of another pair.
     """
-    keys = USUAL | _read_keys(path)
+    content = read_bytes(path, MAX_YAML)
+    keys = USUAL | from_file(path, _keys_of, content)
     written = keys.get("origin")
     numbers = written if isinstance(written, list) else []
     origin = [_number(path, "origin", each) for each in numbers]
@@ -168,7 +169,7 @@ def read_map(path):
         rule = "origin must be [x, y, 0] (a turned map is not supported)"
         raise FormatError(f"{rule}, got {told(written)}", path)
     resolution = _number(path, "resolution", keys.get("resolution"))
-    grey = _read_grey(path, keys.get("image"), PAIR.search(read_bytes(path, MAX_YAML)))[::-1]
+    grey = _read_grey(path, keys.get("image"), PAIR.search(content))[::-1]
     return _probabilities(path, keys, grey), origin[:2], resolution
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dollop.checks import FARTHEST, Note, told
+from dollop.checks import FARTHEST, Note, shortened, told
 from dollop.formats.files import FormatError, warn_of
 
 __all__ = [
@@ -109,14 +109,16 @@ def check_beams(beams):
     Raises
     ------
     ValueError
-        If they are more than 36,000 or none, spread over more than a full turn or over nothing, or
-        begin farther than a full turn from straight ahead.
+        If they are more than 36,000 or none, several in one direction, spread over more than a full
+        turn, or begin farther than a full turn from straight ahead.
     """
     if not 1 <= beams.count <= MAX_BEAMS:
         raise ValueError(f"a scan must have 1 to {MAX_BEAMS} beams, got {told(beams.count)}")
     spread = abs(beams.step) * (beams.count - 1)
-    if not (spread <= FULL_TURN and abs(beams.start) <= FULL_TURN) or beams.step == 0:
-        raise ValueError(f"beams must spread over at most a full turn, got {told(str(beams), 100)}")
+    if beams.step == 0 and beams.count > 1:
+        raise ValueError(f"beams must lie apart, got {shortened(str(beams), 100)}")
+    if not (spread <= FULL_TURN and abs(beams.start) <= FULL_TURN):
+        raise ValueError(f"beams must spread over at most a full turn, got {shortened(str(beams), 100)}")
 
 
 def check_metres(name, values):
@@ -276,8 +278,8 @@ def _pile(ranges, angles, limit):
     return piled, np.ptp(angles[pile.any(axis=0)]) >= WIDE
 
 
-def forgive(path, bad, total):
-    """Accept a few broken scans with one warning, or refuse the file.
+def forgive(path, bad, total, what="scans"):
+    """Accept a few broken scans, or other messages, with one warning, or refuse the file.
 
     A log of at least 20 scans is read without its broken ones as long as they are no more than one
     in a hundred, or a single one. What is broken in more of them is taken to be the file's nature
@@ -291,6 +293,8 @@ def forgive(path, bad, total):
         The reason of every broken scan, by its line.
     total : int
         Scans in the file, the broken ones included.
+    what : str
+        What they are.
 
     Raises
     ------
@@ -312,8 +316,8 @@ def forgive(path, bad, total):
         return
     line = min(bad)
     if total < 20 or len(bad) > max(1, total // 100):
-        raise FormatError(f"{bad[line]} ({len(bad)} of {total} scans are broken)", path, line)
-    lost = f"left out {len(bad)} broken of {total} scans, the first on line {line}"
+        raise FormatError(f"{bad[line]} ({len(bad)} of {total} {what} are broken)", path, line)
+    lost = f"left out {len(bad)} broken of {total} {what}, the first on line {line}"
     warn_of(path, f"{lost}: {bad[line]}")
 
 

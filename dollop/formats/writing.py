@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from dollop.checks import shortened, told
-from dollop.formats.kinds import PGM, PNG, Kind, check_is_nobodys, check_replaceable
+from dollop.formats.kinds import PGM, PNG, Kind, check_no_map_names, check_replaceable
 
 try:
     import fcntl
@@ -256,9 +256,8 @@ def _begin(path, mode, kind, of):
         target = os.path.realpath(checked_path(path))
         before = _replaced(target, kind)
         if kind in (PGM, PNG):
-            check_is_nobodys(target, of)
-        folder = os.path.dirname(target)
-        name = os.path.join(folder, f".dollop-{secrets.token_hex(8)}.part")
+            check_no_map_names(target, of)
+        folder, name = os.path.dirname(target), _neighbour(target)
         with _alone_in([folder]):
             _sweep(folder)
             stream = _made(name, mode, before)
@@ -311,24 +310,43 @@ def _end(part):
 
 def _take_names(parts):
     """Give all neighbours their names, the last one's first; an interrupt waits until all have."""
+    aside = {}
     with _alone_in({os.path.dirname(part.target) for part in parts}) as to_disk:
         try:
-            _rename(parts, to_disk)
-        except KeyboardInterrupt:
-            _rename(parts, to_disk)
-            raise
+            try:
+                _rename(parts, aside, to_disk)
+            except KeyboardInterrupt:
+                _rename(parts, aside, to_disk)
+                raise
+        finally:
+            _put_away(parts[-1], aside)
 
 
-def _rename(parts, to_disk):
-    """Give their names to the neighbours that have not got them yet."""
+def _rename(parts, aside, to_disk):
+    """Give their names to the neighbours that have not got them yet; old companions stand aside meanwhile."""
     left = [part for part in parts if os.path.lexists(part.name)]
     for part in left[:-1]:
         if os.path.lexists(part.target):
-            _do(part, os.unlink, part.target)
+            name = _neighbour(part.target)
+            _do(part, os.replace, part.target, name)
+            aside[part.target] = name
     to_disk()
     for part in reversed(left):
         _do(part, os.replace, part.name, part.target)
         to_disk()
+
+
+def _put_away(main, aside):
+    """Remove the old companions, or put them back where the main file could not take its name."""
+    done = not os.path.lexists(main.name)
+    for target, name in aside.items():
+        with suppress(OSError):
+            os.unlink(name) if done else os.replace(name, target)
+
+
+def _neighbour(target):
+    """The name of a new neighbour of a file."""
+    return os.path.join(os.path.dirname(target), f".dollop-{secrets.token_hex(8)}.part")
 
 
 def _do(part, change, *names):

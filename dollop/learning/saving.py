@@ -35,8 +35,8 @@ __all__ = ["as_dict", "read_task"]
 FORMAT, VERSION = "dollop task", 2
 SAME = 1e-6
 """m: places that two numbers of a file give must agree to this, or to this share of how far they are from 0."""
-MOST, MAX_SAMPLES, MAX_TEXT = 1000, 20_000, 10_000
-"""Of each list, samples of a walk (half an hour of ten a second), and characters of a note."""
+MOST = 10_000
+"""Demonstrations, ways and notes, each; walks are as long as there is room for in a JSON file."""
 ALWAYS = "format", "version", "demonstrations"
 LAW = "start", "speeds", "segments", "association"
 TASK = *ALWAYS, "method", "environment", "objects", "partners", "notes"
@@ -56,7 +56,14 @@ def as_dict(task):
     -------
     dict
         Names to numbers, text, lists and arrays, of which JSON makes lists; the model is not in it.
+
+    Raises
+    ------
+    ValueError
+        If there are more than ten thousand demonstrations, ways or notes, which would not be read.
     """
+    for name in ("demonstrations", "ways", "notes"):
+        _check_count(name, getattr(task, name))
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -165,12 +172,16 @@ def _task_of(content, make_task, make_demonstration, laid_out):
     return _task_from(content, shown, make_task, laid_out)
 
 
+def _check_count(name, values):
+    if len(values) > MOST:
+        raise ValueError(f"{name} must be at most {MOST}, got {len(values)}")
+
+
 def _all(name, content, make, *known):
     """What is made of each of a list, a tuple; what is refused is named by its number."""
     if not isinstance(content, list):
         raise ValueError(f"{name} must be a list, got {told(content)}")
-    if len(content) > MOST:
-        raise ValueError(f"{name} must be at most {MOST}, got {len(content)}")
+    _check_count(name, content)
     return tuple(_named(f"{name}[{k}]", make, each, *known) for k, each in enumerate(content))
 
 
@@ -272,12 +283,8 @@ def _way_from(content, count):
 
 
 def _walks_from(content):
-    """Walks that are as long as somebody shows something."""
-    walks = _all("walks", content, lambda each: checked_positions("a walk", each, "N", 2))
-    longest = max(map(len, walks), default=0)
-    if longest > MAX_SAMPLES:
-        raise ValueError(f"a walk must have at most {MAX_SAMPLES} samples, got {longest}")
-    return check_trajectories(walks)
+    """Walks as arrays."""
+    return check_trajectories(_all("walks", content, lambda each: checked_positions("a walk", each, "N", 2)))
 
 
 def _shares_from(content, walks):
@@ -320,9 +327,8 @@ def _demonstration_from(content):
 
 def _note_from(content):
     kinds = [type(each) for each in content] if isinstance(content, list) else []
-    if kinds != [str, str, bool] or len(content[0]) + len(content[1]) > MAX_TEXT:
-        rule = f"a note must be kind and text, of at most {MAX_TEXT} characters, and doubt"
-        raise ValueError(f"{rule}, got {told(content)}")
+    if kinds != [str, str, bool]:
+        raise ValueError(f"a note must be kind, text and doubt, got {told(content)}")
     return Note(*content)
 
 

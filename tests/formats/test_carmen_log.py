@@ -471,8 +471,8 @@ NO_LASER = {
     r"a range must be finite, not negative and within 1e\+09 m, got 2e\+09": GOOD.replace("2.0", "2e9", 1),
     r"a pose must be within 1e\+09 m, got .5000000000.0, 0.0, 0.0": flaser((1.0, 2.0, 3.0), pose=(5e9, 0, 0)),
     "a scan must have 1 to 36000 beams, got 36001": flaser([1.0] * 36_001),
-    "beams must spread over at most a full turn, got '3 beams from -1 rad": robotlaser(step=9),
-    "beams must spread over at most a full turn, got '3 beams from 99 rad": robotlaser(start=99),
+    "beams must spread over at most a full turn, got 3 beams from -1 rad": robotlaser(step=9),
+    "beams must spread over at most a full turn, got 3 beams from 99 rad": robotlaser(start=99),
     "an angular resolution must be positive and finite, got 0.0": robotlaser(step=0),
 }
 
@@ -516,3 +516,14 @@ def test_odometry_tells_what_is_wrong(tmp_path):
     """Where no message can be read, the first one is told."""
     with pytest.raises(FormatError, match="line 1: could not convert string to float: b'0_1' .1 of 1 scans are broken"):
         carmen_log.read_odometry(write(tmp_path / "a.log", ["ODOM 1 2 3 0_1 0 0 1 host 1"]))
+
+
+def test_scans_that_are_alike_may_be_packed(tmp_path):
+    """A laser without noise packs to less than a hundredth, and is read back; lines that are passed over may not."""
+    count, angles = 5000, np.radians(np.arange(-90.0, 91.0))
+    log = LaserLog(np.arange(float(count)), np.full((count, 181), 5.0), angles, np.zeros((count, 3)), 80.0)
+    carmen_log.write_log(tmp_path / "a.log.gz", log)
+    np.testing.assert_array_equal(carmen_log.read_log(tmp_path / "a.log.gz").ranges, log.ranges)
+    (tmp_path / "b.log.gz").write_bytes(gzip.compress((b"a" * 99_999 + b"\n") * 100))
+    with pytest.raises(FormatError, match="lines that are passed over: 100 times the size of the file is the most"):
+        carmen_log.read_log(tmp_path / "b.log.gz")

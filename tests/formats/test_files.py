@@ -122,14 +122,11 @@ def test_a_large_file_is_refused_by_its_size(tmp_path):
     assert "holds more than 1073741824 bytes" in told and used < 1_000_000
 
 
-def test_lines_are_counted_and_packed_ones_measured(tmp_path):
-    """Two million empty lines are the most; text that unpacks to more than a hundred times its size is none."""
+def test_lines_are_counted(tmp_path):
+    """Two million are the most."""
     (tmp_path / "newlines").write_bytes(b"\n" * 2_000_001)
     with pytest.raises(FormatError, match="holds more than 2000000 lines, the most that is read"):
         sum(1 for _ in read_lines(tmp_path / "newlines"))
-    (tmp_path / "alike.gz").write_bytes(gzip.compress((b"a" * 99_999 + b"\n") * 100))
-    with pytest.raises(FormatError, match="100 times its size are the most that is read"):
-        list(read_lines(tmp_path / "alike.gz"))
 
 
 def test_lines_are_those_of_the_file(tmp_path):
@@ -187,7 +184,7 @@ def test_a_file_that_breaks_off_in_reading_is_named():
         (b"[-1%s]" % (b"0" * 5000), "a number must be finite, .*, got -10000"),
         (b'{"a": 1, "b": {"c": 1, "c": 2}}', "a name must be given once, got 'c' again"),
         (b'["\xff"]', "not a task: .*utf-8"),
-        (b"[%s[]]" % (b"[]," * 600_000), "holds more than 1000000 values, the most that is read"),
+        (b"[%s[]]" % (b"[]," * 2_100_000), "4000000 values are the most that is read, got 6300004 and 4200002"),
         (b"[]" + b" " * (64 << 20), "holds more than 67108864 bytes, the most that is read"),
     ],
 )

@@ -453,3 +453,25 @@ def test_a_disk_that_is_full_is_told_of_the_file_that_was_asked_for(tmp_path):
         os._exit(1)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
     assert left(tmp_path) == ["a"] and (tmp_path / "a").read_text() == "old"
+
+
+def test_companions_come_back_where_the_main_file_cannot_take_its_name(tmp_path):
+    """As where somebody else has made a folder of that name meanwhile."""
+    (tmp_path / "a.png").write_bytes(b"old")
+    with pytest.raises(OSError, match="a.csv cannot be written"), together():
+        for name in ("a.png", "a.csv"):
+            with whole_file(tmp_path / name) as stream:
+                stream.write(b"new")
+        (tmp_path / "a.csv").mkdir()
+    assert (tmp_path / "a.png").read_bytes() == b"old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.png"]
+
+
+def test_a_picture_elsewhere_is_not_this_one(tmp_path):
+    """Maps name pictures of the same name in other folders, and other programs name things that are called so."""
+    (tmp_path / "nav.yaml").write_text("image: ../other/lab.pgm\n")
+    (tmp_path / "docker-compose.yaml").write_text("services:\n  nav:\n    image: registry/lab.pgm\n")
+    check_writable(tmp_path / "lab.pgm", PGM, tmp_path / "lab.yaml")
+    (tmp_path / "nav.yaml").write_text(f"image: ../{tmp_path.name}/lab.pgm\n")
+    with pytest.raises(OSError, match="it is the picture of the map nav.yaml"):
+        check_writable(tmp_path / "lab.pgm", PGM, tmp_path / "lab.yaml")

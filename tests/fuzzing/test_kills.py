@@ -56,7 +56,7 @@ def test_kills_at_random_moments_leave_no_mixture():
 def test_what_mixes_or_litters_is_found(monkeypatch):
     """Without the removal of the old picture, or the sweeping, the same kills tell of it."""
 
-    def in_order(parts, to_disk):
+    def in_order(parts, aside, to_disk):
         for part in parts:
             os.replace(part.name, part.target)
 
