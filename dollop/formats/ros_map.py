@@ -54,11 +54,11 @@ MAX_YAML, MAX_NODES = 1 << 16, 1000
 MAX_PICTURE, MAX_HEAD = 1 << 27, 1 << 12
 """Bytes of the picture, the most cells in text, and of a PGM's head up to its size."""
 
-PNG, PNM_SIZE = (
-    b"\x89PNG\r\n\x1a\n",
-    re.compile(rb"P[1-6](?:\s|#[^\n\r]*[\n\r])+(\d+)(?:\s|#[^\n\r]*[\n\r])+(\d+)\s"),
-)
-"""How a PNG begins, and a PGM or another of its family, with its size."""
+PNG = b"\x89PNG\r\n\x1a\n"
+"""How a PNG begins."""
+_GAP = rb"(?:\s|#[^\n\r]*[\n\r])+"
+PNM_SIZE = re.compile(rb"P[1-6]" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)\s")
+"""How a PGM begins, or another of its family, with its size."""
 
 PAIR = re.compile(rb"^# dollop pair ([0-9a-f]{16})$", re.MULTILINE)
 """The comment by which the two files of a map know each other, in both of them."""

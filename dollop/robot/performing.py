@@ -178,10 +178,8 @@ class Unicycle:
         return "Unicycle at ({:.2f}, {:.2f}, {:.2f})".format(*self.pose)
 
     def __init__(self, pose, limits=PIONEER_LIMITS, period=0.1):
-        self.limits, self.period = (
-            Limits(*checked_array("limits", limits, 4)),
-            checked_number("period", period, *PERIODS),
-        )
+        self.limits = Limits(*checked_array("limits", limits, 4))
+        self.period = checked_number("period", period, *PERIODS)
         self.place(pose)
 
     def place(self, pose):
@@ -369,13 +367,8 @@ def checked_kidnappings(kidnap):
             raise ValueError(f"a kidnapping must be a time and a pose, got {told(each)}")
         time, pose = pair
         check_positive("the time of a kidnapping", time, or_zero=True)
-        name = f"the pose of the kidnapping at {time:g} s"
-        found.append(
-            (
-                float(time),
-                tuple(checked_positions(name, pose, 3).tolist()),
-            )
-        )
+        pose = checked_positions(f"the pose of the kidnapping at {time:g} s", pose, 3)
+        found.append((float(time), tuple(pose.tolist())))
     return found
 
 
