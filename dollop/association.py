@@ -135,14 +135,10 @@ class Association:
         if len(lost):
             gone = f"all of subgoal {lost[0]}: corners {self.corners[lost[0]].tolist()}"
             raise ValueError(f"a subgoal needs a matched corner, the matching leaves out {gone}")
-        differences = self.differences
-        if checked_flag("turned", turned):
-            matched = indices >= 0
-            before, now = self.environment.corners[matched], environment.corners[indices[matched]]
-            differences = differences @ rotation(layout_turn(before, now)).T
+        differences = self._differences(environment, indices, turned)
         return np.einsum("km,kmd->kd", weights / totals, environment.corners[corners] + differences)
 
-    def carried(self, environment, matching=None):
+    def carried(self, environment, matching=None, turned=False):
         """The same ties with the objects where they stand now (Sec. IV-B).
 
         Relocating from it goes on from the demonstrated differences, so that moving objects there
@@ -154,6 +150,8 @@ class Association:
             The objects as they stand now.
         matching : Matching, optional
             As for `relocate`.
+        turned : bool
+            Beyond the paper: with differences that are turned with the layout.
 
         Returns
         -------
@@ -165,8 +163,16 @@ class Association:
         ValueError
             As `relocate`, but that a subgoal may lose all its ties.
         """
-        _, corners, weights = self._ties(environment, matching)
-        return Association(environment, corners, weights, self.differences)
+        indices, corners, weights = self._ties(environment, matching)
+        return Association(environment, corners, weights, self._differences(environment, indices, turned))
+
+    def _differences(self, environment, indices, turned):
+        """The differences (K, m, 2) in m, turned with the layout if that is wanted."""
+        if not checked_flag("turned", turned):
+            return self.differences
+        matched = indices >= 0
+        before, now = self.environment.corners[matched], environment.corners[indices[matched]]
+        return self.differences @ rotation(layout_turn(before, now)).T
 
     def _ties(self, environment, matching):
         """Where all corners go (4N,), where those of each subgoal go (K, m), and their weights."""

@@ -141,6 +141,8 @@ def _holds_numbers(values, depth=0):
         return values.dtype.kind in "iuf"
     if isinstance(values, _BUFFERS) or depth > _DEEPEST:
         return False
+    if hasattr(values, "dtypes"):  # a table of pandas: without rows its columns have no kind yet
+        return not len(values) or all(kind.kind in "iuf" for kind in np.atleast_1d(values.dtypes))
     if not isinstance(values, Sequence):
         return _is_number(values) or np.asarray(values).dtype.kind in "iuf"
     kinds = set(map(type, values))
@@ -515,7 +517,8 @@ def checked_records(name, values, kind):
     try:
         found = tuple(islice(None if isinstance(values, Mapping | Set) else values, _MOST_RECORDS + 1))
     except TypeError:
-        raise ValueError(f"{name} must be several of {kind.__name__}, got {told(values)}") from None
+        several = "several" if kind is object else f"several of {kind.__name__}"
+        raise ValueError(f"{name} must be {several}, got {told(values)}") from None
     if len(found) > _MOST_RECORDS:
         raise ValueError(f"{name} must be at most {_MOST_RECORDS}, got {told(values)}")
     values = found
@@ -558,7 +561,7 @@ def checked_generator(name, seed):
     ----------
     name : str
         What to call it in the error.
-    seed : int or Generator
+    seed : int, sequence of int, SeedSequence or Generator
 
     Returns
     -------
@@ -568,7 +571,7 @@ def checked_generator(name, seed):
     Raises
     ------
     ValueError
-        For what is no seed.
+        For what is no seed, None among it: numbers must come out again.
 
     Examples
     --------
@@ -576,8 +579,10 @@ def checked_generator(name, seed):
     Traceback (most recent call last):
     ValueError: seed, if no Generator, must be a whole number, 0 to 3.40282366921e+38, got 'luck'
     """
-    if isinstance(seed, np.random.Generator):
-        return seed
+    if isinstance(seed, np.random.Generator | np.random.SeedSequence):
+        return np.random.default_rng(seed)
+    if isinstance(seed, list | tuple):
+        return np.random.default_rng(checked_wholes(name, seed, "N").tolist())
     return np.random.default_rng(checked_whole(f"{name}, if no Generator,", seed, 0, _MOST_SEED))
 
 

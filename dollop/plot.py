@@ -242,7 +242,7 @@ def scan(ax, log, i, label="laser scan"):
         Which of its scans.
     label : str, optional
     """
-    i = checked_whole("i, of the scans,", i, 1 - len(log), len(log) - 1)
+    i = checked_whole("i, of the scans,", i, -len(log), len(log) - 1)
     x, y, _ = log.poses[i]
     xs, ys = endpoints(log)[i, np.isfinite(log.ranges[i])].T
     rays = np.stack([np.full_like(xs, x), xs]), np.stack([np.full_like(ys, y), ys])

@@ -358,7 +358,7 @@ class SequencedLDS:
             states = [place]
             while np.linalg.norm(states[-1] - each.goal) > reach:
                 check_ends(len(states), each.goal, reach)
-                states.append(each.step(states[-1]))
+                states.append(each.goal + (states[-1] - each.goal) @ each.A.T)
                 if (states[-1] == states[-2]).all():  # no nearer in floating point
                     check_ends(MOST_STEPS, each.goal, reach)
             parts.append(np.array(states))

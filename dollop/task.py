@@ -172,6 +172,9 @@ class Task:
         Which object of the environment each of those is, -1 where it is gone.
     learned : tuple of Way
         The ways as they were learned; none where the task was learned by method "paper".
+    turn : float
+        By how much the offsets from the objects are turned with the layout, in rad, since the ways
+        were learned.
 
     Raises
     ------
@@ -190,6 +193,7 @@ class Task:
     partners: tuple = ()
     objects: np.ndarray = None
     learned: tuple = ()
+    turn: float = 0.0
 
     def __post_init__(self):
         law = checked_record("law", self.law, SequencedLDS)
@@ -214,6 +218,7 @@ class Task:
             partners=checked_partners(self.partners, shown, len(objects)),
             objects=objects,
             learned=checked_records("learned", self.learned, Way),
+            turn=checked_number("turn", self.turn),
         )
         gone = {k for way in self.learned for k in way.members}
         lost = [k for k, each in enumerate(self.partners) if each is not None and k not in gone]
@@ -341,7 +346,7 @@ class Task:
         if not self.learned:
             start, *subgoals = self.association.relocate(environment, matching, turned)
             law = self.law.with_subgoals(subgoals, start, turned)
-            tied = self.association.carried(environment, matching)
+            tied = self.association.carried(environment, matching, turned)
             return replace(
                 self,
                 law=law,
@@ -351,9 +356,9 @@ class Task:
                 ways=(law,),
                 objects=objects,
             )
-        turn = layout_turn_of(self.environment, environment, matching) if turned else 0.0
+        turn = self.turn + layout_turn_of(self.environment, environment, matching) if turned else 0.0
         known = {name: getattr(self, name) for name in ("model", "demonstrations", "partners", "learned")}
-        return _laid_out(known | {"notes": notes}, environment, objects, turn)
+        return _laid_out(known | {"notes": notes, "turn": turn}, environment, objects)
 
     def errors(self):
         """How far the task is from what each demonstration showed, in its own environment.
@@ -423,18 +428,13 @@ class Task:
             For a file that is damaged, not a task, of another version, or whose numbers contradict
             each other.
         """
-        return read_task(path, _as_read, Demonstration, _laid_out)
+        return read_task(path, cls, Demonstration, _laid_out)
 
 
-def _as_read(law, environment, association, **known):
-    """The task of a file, or, where that holds ways and no law, what is known of it."""
-    return known if law is None else Task(law, environment, association, **known)
-
-
-def _laid_out(known, environment, objects, turn=0.0):
+def _laid_out(known, environment, objects):
     """The task of ways that were learned, and of what else is known, where objects stand in an environment."""
     ways, partners = known["learned"], inverse(objects, len(environment))
-    placed = [way.among(environment, partners, turn) for way in ways]
+    placed = [way.among(environment, partners, known.get("turn", 0.0)) for way in ways]
     laws, kept = zip(*(way.law(now) for way, now in zip(ways, placed, strict=True)), strict=True)
     tied = tied_to_corners(ways[0], placed[0], laws[0], environment, objects)
     notes = tuple(dict.fromkeys((*known["notes"], *told_of_places(ways, kept, partners))))

@@ -354,8 +354,10 @@ class Tracker:
         checked_record("motion", self.motion, Motion)
         check_choice("matching", self.matching, MATCHERS)
         check_choice("occlusion", self.occlusion, ("kalman", "particles"))
-        for name in ("gate", "gate_min", "gate_max", "disappear_after"):
+        for name in ("gate", "gate_min"):
             checked_number(name, getattr(self, name), 1 / MOST_NUMBER, MOST_NUMBER)
+        for name in ("gate_max", "disappear_after"):  # infinity is no limit
+            checked_number(name, getattr(self, name), 1 / MOST_NUMBER, np.inf)
 
 
 def track_objects(t, objects, tracker=None, visible=None, seed=0):

@@ -4,6 +4,8 @@ A trajectory is an (N, d) array of positions in m in the order they were visited
 plane.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 
@@ -110,10 +112,10 @@ def is_one(trajectories):
     bool
         By its first row, which is numbers; what is neither is several.
     """
-    if not isinstance(trajectories, list | tuple):
+    if not isinstance(trajectories, Sequence):
         return len(getattr(trajectories, "shape", ())) == 2
     first = trajectories[0] if len(trajectories) else ()
-    if not isinstance(first, list | tuple):
+    if not isinstance(first, Sequence):
         return np.ndim(first) == 1
     return len(first) > 0 and np.isscalar(first[0])
 

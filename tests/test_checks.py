@@ -19,6 +19,7 @@ from dollop.checks import (
     checked_array,
     checked_flag,
     checked_flags,
+    checked_generator,
     checked_number,
     checked_positions,
     checked_record,
@@ -251,3 +252,23 @@ def test_what_is_put_into_a_record_stays():
     assert record.points.tolist() == [1.0, 2.0] and isinstance(record.side, float)
     with pytest.raises(ValueError, match="read-only"):
         record.points[0] = 7.0
+
+
+def test_tables_of_pandas_are_numbers():
+    """Also of the types that know what is missing, and without rows; with something missing, or text, they are none."""
+    table = pd.DataFrame({"x": [1, 2], "y": [0.5, 1.5]})
+    for each in (table, table.convert_dtypes()):
+        np.testing.assert_array_equal(checked_array("x", each, "N", 2), table)
+    assert checked_array("x", pd.DataFrame(columns=["x", "y"]), "N", 2).shape == (0, 2)
+    for wrong in (table.assign(x="a"), pd.DataFrame({"x": [1, None]}, dtype="Int64").assign(y=1.0)):
+        with pytest.raises(ValueError, match="must be"):
+            checked_array("x", wrong, "N", 2)
+
+
+def test_seeds_are_those_of_numpy_but_none():
+    """Several numbers, a sequence of seeds and a generator are; numbers that come out otherwise each time are not."""
+    for seed in (3, [3, 5], np.random.SeedSequence(3)):
+        one, other = checked_generator("seed", seed), np.random.default_rng(seed)
+        assert one.random() == other.random()
+    with pytest.raises(ValueError, match="seed, if no Generator, must be a whole number"):
+        checked_generator("seed", None)

@@ -1,4 +1,4 @@
-"""Records at a prompt: each prints itself in a line or two, however long its arrays."""
+"""Records: each prints itself in a line or two, and refuses what it is not."""
 
 from dataclasses import fields, replace
 from types import SimpleNamespace
@@ -287,12 +287,14 @@ WRONG = {
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
-def test_hostile_calls_are_refused_in_a_line(call):
+def test_hostile_calls_are_refused_in_a_line(call, tmp_path, monkeypatch):
     """Nothing raw from the depth, no warning, no endless loop; nothing is written."""
+    monkeypatch.chdir(tmp_path)
     for said, value in WRONG.items():
         with pytest.raises(ValueError) as refused:
             call(value)
         assert len(str(refused.value)) <= 300 and "\n" not in str(refused.value), said
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_hostile_calls_found_stays_mended():

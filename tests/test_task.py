@@ -409,6 +409,24 @@ def test_what_is_saved_can_be_loaded(tmp_path):
         as_dict(SimpleNamespace(demonstrations=range(10_001), ways=(), notes=()))
 
 
+@pytest.mark.parametrize("method", ["anchored", "paper"])
+def test_a_turned_task_is_saved_as_it_is(method, tmp_path):
+    """With its turn; and a layout that turns there and back turns nothing."""
+    boxes = np.array([[0, 0, 0.4, 0.4], [4, 0, 4.8, 0.4]])
+    angle = np.linspace(0, np.pi, 50)
+    walk = np.column_stack([2 + np.cos(angle), 1 + np.sin(angle)])
+    task = learn([Demonstration(walk, Environment(boxes))], method=method)
+    there = Environment([[0, 0, 0.4, 0.4], [0, 4, 0.4, 4.8]])
+    turned = task.adapt(there, Matching.of_partners([0, 1]), turned=True)
+    assert np.abs(turned.law.subgoals - task.adapt(there, Matching.of_partners([0, 1])).law.subgoals).max() > 0.1
+    turned.save(tmp_path / "a.json")
+    again = Task.load(tmp_path / "a.json")
+    np.testing.assert_allclose(again.law.subgoals, turned.law.subgoals, atol=1e-9)
+    for each in (turned, again):
+        back = each.adapt(Environment(boxes), Matching.of_partners([0, 1]), turned=True)
+        np.testing.assert_allclose(back.law.subgoals, task.law.subgoals, atol=1e-6)
+
+
 def test_every_demonstration_goes_a_way_or_is_set_aside():
     """A task whose ways are not those of one of its demonstrations contradicts itself."""
     task = learn([Demonstration(eight(), Environment(CANS))])

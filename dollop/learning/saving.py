@@ -11,12 +11,10 @@ import numpy as np
 
 from dollop.association import Association
 from dollop.checks import (
-    FARTHEST,
     Note,
     check_choice,
     check_positive,
     checked_array,
-    checked_flags,
     checked_positions,
     checked_wholes,
     told,
@@ -74,6 +72,7 @@ def as_dict(task):
         "notes": [[note.kind, note.text, note.doubt] for note in task.notes],
         "demonstrations": [_of_demonstration(each) for each in task.demonstrations],
     }
+    content |= {"turn": task.turn} if task.turn else {}
     return content | ({"ways": list(map(_of_way, task.learned))} if task.learned else _of_law(task))
 
 
@@ -149,8 +148,8 @@ def read_task(path, make_task, make_demonstration, laid_out):
     ------
     FormatError
         For a file that is damaged, not a task, of another version, or whose numbers contradict each
-        other; and beyond the bounds of `dollop.formats.files.read_json`, 1000 of a list and 20,000
-        samples of a walk.
+        other; and beyond the bounds of `dollop.formats.files.read_json`, and 10,000
+        demonstrations, ways or notes.
     """
     content = read_json(path, "a task")
     return from_file(path, _task_of, content, make_task, make_demonstration, laid_out)
@@ -166,7 +165,7 @@ def _task_of(content, make_task, make_demonstration, laid_out):
         content = _as_version_2(content)
     check_choice("method", content.get("method"), ("anchored", "paper"))
     further = ["ways"] if content["method"] == "anchored" else LAW
-    check_fields("a task", content, (*TASK, *further))
+    check_fields("a task", content, (*TASK, *further), ["turn"])
     each_shown = _all("demonstrations", content["demonstrations"], _demonstration_from)
     shown = tuple(make_demonstration(**each) for each in each_shown)
     return _task_from(content, shown, make_task, laid_out)
@@ -211,23 +210,22 @@ def _shown_in_version_1(content):
 
 def _task_from(content, shown, make_task, laid_out):
     environment = _named("environment", _environment_from, content["environment"])
-    partners = _partners_from(content["partners"], shown)
+    partners = _all("partners", content["partners"], _partner_from)
     objects = content["objects"]
     if objects is not None:
         objects = checked_wholes("objects", objects, "N", least=-1, most=len(environment) - 1)
     notes = _all("notes", content["notes"], _note_from)
-    known = {"demonstrations": shown, "notes": notes, "partners": partners, "objects": objects}
+    known = {"demonstrations": shown, "notes": notes, "partners": partners, "turn": content.get("turn", 0.0)}
     if content["method"] == "paper":
         law = _law_from(content)
         tied = _named("association", _association_from, content["association"], environment, anchors(law))
-        return make_task(law, environment, tied, **known)
+        return make_task(law, environment, tied, objects=objects, **known)
     ways = _all("ways", content["ways"], _way_from, len(shown))
     check_positive("the number of ways", len(ways))
     count = len(checked_wholes("objects", objects, "N", least=-1))
     if max(way.objects.max(initial=-1) for way in ways) >= count:
         raise ValueError(f"the ways follow more than the {count} objects that there are")
-    blank = make_task(None, environment, None, learned=ways, **known)
-    return laid_out(blank, environment, objects)
+    return laid_out(known | {"learned": ways}, environment, objects)
 
 
 def _law_from(content):
@@ -261,53 +259,17 @@ def _association_from(content, environment, places):
 
 def _way_from(content, count):
     check_fields("a way", content, WAY)
-    # Smooth weights go a little beyond 0 and 1.
-    weights = checked_array("weights", content["weights"], PLACES, "F", least=-1, most=2)
-    if np.abs(weights.sum(axis=1) - 1).max() > SAME:
-        raise ValueError("the weights of each place must sum to 1")
-    frames, walks = weights.shape[1], _walks_from(content["walks"])
-    objects = checked_wholes("objects", content["objects"], frames, least=-1)
-    turning = checked_flags("turning", content["turning"], frames)
-    if objects[-1] != -1 or turning[-1] or (objects[:-1] < 0).any():
-        raise ValueError("the last frame of a way must be the world, and no other")
-    members = checked_wholes("members", content["members"], "K", most=count - 1)
-    covered = checked_array("covered", content["covered"], len(members), 2, least=-FARTHEST, most=FARTHEST)
-    check_positive("sample_period", content["sample_period"])
-    check_positive("tolerance", content["tolerance"])
-    local = checked_array("local", content["local"], PLACES, frames, 2, least=-2 * FARTHEST, most=2 * FARTHEST)
-    return Way(
-        tuple(walks), _shares_from(content["shares"], walks), checked_positions("home", content["home"], PLACES, 2),
-        weights, local, objects, turning, tuple(members.tolist()), tuple(map(tuple, covered.tolist())),
-        content["sample_period"], content["tolerance"],
-    )  # fmt: skip
+    way = Way(**content)
+    if len(way.home) != PLACES:
+        raise ValueError(f"home must hold {PLACES} places, got {len(way.home)}")
+    if max(way.members, default=-1) >= count:
+        raise ValueError(f"members must be below {count}, the number of demonstrations, got {max(way.members)}")
+    return way
 
 
 def _walks_from(content):
     """Walks as arrays."""
     return check_trajectories(_all("walks", content, lambda each: checked_positions("a walk", each, "N", 2)))
-
-
-def _shares_from(content, walks):
-    """Where along the places each sample of each walk is."""
-    bounds = {"least": 0, "most": PLACES - 1}
-    shares = _all("shares", content, lambda each: checked_array("shares", each, "N", **bounds))
-    if [len(each) for each in shares] != [len(each) for each in walks]:
-        raise ValueError(f"shares must be one for each sample of {len(walks)} walks")
-    for share in shares:
-        if (np.diff(share) < 0).any():
-            fall = -np.diff(share).min()
-            raise ValueError(f"shares must rise from 0 to {PLACES - 1}, got a fall by {fall:g}")
-    return shares
-
-
-def _partners_from(content, shown):
-    partners = _all("partners", content, _partner_from)
-    if len(partners) not in (0, len(shown)):
-        raise ValueError(f"partners must be given for each of {len(shown)} demonstrations, got {len(partners)}")
-    for each, one in zip(partners, shown, strict=False):
-        if each is not None and len(each) != len(one.environment):
-            raise ValueError(f"partners must be of {len(one.environment)} objects, got {len(each)}")
-    return partners
 
 
 def _partner_from(content):

@@ -30,8 +30,8 @@ from dollop.trajectory import align, arc_length, check_trajectory, resample
 
 __all__ = ["Way", "curve_of", "way_of", "which_places"]
 
-MOST_WEIGHT = 1e6
-"""Of a place by an object, of either sign: the weights of a place sum to 1."""
+WEIGHTS, ROUNDING = (-1, 2), 1e-6
+"""What a weight can be: smooth ones go a little beyond 0 and 1; and what those of a place may miss 1 by."""
 LOOSER = 4
 """Times that the tolerance of a law is doubled where objects bend its way too sharply."""
 SLOWER, FASTER = 0.2, 5.0
@@ -92,7 +92,13 @@ class Way:
         shares = tuple(checked_array("shares", each, len(walk), least=0, most=len(home) - 1) for each, walk in pairs)
         for each in (*walks, *shares):
             each.flags.writeable = False
-        weights = checked_array("weights", self.weights, len(home), "F", least=-MOST_WEIGHT, most=MOST_WEIGHT)
+        for each in shares:
+            if (np.diff(each) < 0).any():
+                raise ValueError(f"shares must rise from 0 to {len(home) - 1}, got a fall by {-np.diff(each).min():g}")
+        least, most = WEIGHTS
+        weights = checked_array("weights", self.weights, len(home), "F", least=least, most=most)
+        if np.abs(weights.sum(axis=1) - 1).max(initial=0) > ROUNDING:
+            raise ValueError("the weights of each place must sum to 1")
         local = checked_array("local", self.local, *weights.shape, 2, least=-2 * FARTHEST, most=2 * FARTHEST)
         frames = weights.shape[1]
         put_in(self, walks=walks, shares=shares, home=home, weights=weights, local=local)
@@ -104,7 +110,9 @@ class Way:
             sample_period=checked_number("sample_period", self.sample_period, *PERIODS),
             tolerance=checked_number("tolerance", self.tolerance, LEAST_REACH),
         )
-        covered = checked_array("covered", self.covered, len(self.members), 2)
+        if not frames or self.objects[-1] != -1 or self.turning[-1] or (self.objects[:-1] < 0).any():
+            raise ValueError("the last frame of a way must be the world, and no other")
+        covered = checked_array("covered", self.covered, len(self.members), 2, least=-FARTHEST, most=FARTHEST)
         put_in(self, covered=tuple(map(tuple, covered.tolist())))
 
     def __repr__(self):

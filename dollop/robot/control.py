@@ -89,21 +89,23 @@ class Limits(namedtuple("Limits", "speed turn acceleration turn_acceleration")):
     Raises
     ------
     ValueError
-        For what is not a positive number, a millionth at least and a million at most.
+        For what is not a positive number, a millionth at least and a million at most; accelerations may
+        be infinite.
 
     Examples
     --------
     >>> Limits(0.5, 0.8, 0.5, 0.0)
     Traceback (most recent call last):
-    ValueError: turn_acceleration must be in 1e-06 to 1e+06, got 0.0
+    ValueError: turn_acceleration must be in 1e-06 to inf, got 0.0
     """
 
     __slots__ = ()
 
     def __new__(cls, speed, turn, acceleration, turn_acceleration):
         values = speed, turn, acceleration, turn_acceleration
-        pairs = zip(cls._fields, values, strict=True)
-        return super().__new__(cls, *(checked_number(name, value, 1e-6, 1e6) for name, value in pairs))
+        most = 1e6, 1e6, np.inf, np.inf  # without mass there is no limit
+        checked = zip(cls._fields, values, most, strict=True)
+        return super().__new__(cls, *(checked_number(name, value, 1e-6, end) for name, value, end in checked))
 
     @classmethod
     def _make(cls, values):

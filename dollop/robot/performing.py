@@ -43,9 +43,9 @@ __all__ = ["Run", "Unicycle", "perform"]
 SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
 """A robot that does not know where it is turns on the spot, in rad/s, and moves off what it
 touches, in m/s: back, and if that has not helped within so many s, forth."""
-MOST_PERIODS = 100_000
-"""Control periods after which any run is given up: three hours or five kilometres, ten a second."""
-PERIODS = 1e-4, 10.0
+LONGEST_RUN, MOST_PERIODS = 1e4, 1_000_000
+"""s and control periods after which any run is given up: three hours, or a quarter of one at a thousand a second."""
+PERIODS = 1e-3, 10.0
 """s: no motor is told more often what to do, and none is left alone for longer."""
 SOONEST = 1e-6
 """s: the shortest time-out."""
@@ -64,14 +64,14 @@ class Run:
     poses : (N, 3) float array
         x, y in m, theta in rad, as the robot believed it.
     true_poses : (N, 3) float array
-        As it was; the same for a robot that knows its pose.
+        As it was; the same for a robot that knows its pose. NaN where nobody knew.
     active : (N,) int array
         Index of the segment in force, within the way in force.
     localised : (N,) bool array
         Whether the robot trusted its pose.
     clearance : (N,) float array
         Distance in m between the edge of the robot, taken as a disc, and the nearest obstacle on
-        its map, or that it has noticed by then.
+        its map, or that it has noticed by then; NaN where nobody knew where it was.
     finished : bool
         Whether every segment handed over.
     reason : str
@@ -113,10 +113,10 @@ class Run:
             self,
             t=t,
             poses=checked_but_last("poses", self.poses, len(t), 3),
-            true_poses=checked_but_last("true_poses", self.true_poses, len(t), 3),
+            true_poses=checked_array("true_poses", self.true_poses, len(t), 3, finite=False),
             active=checked_wholes("active", self.active, len(t)),
             localised=checked_flags("localised", self.localised, len(t)),
-            clearance=checked_but_last("clearance", self.clearance, len(t)),
+            clearance=checked_array("clearance", self.clearance, len(t), finite=False),
             finished=checked_flag("finished", self.finished),
             reason=checked_record("reason", self.reason, str),
             collisions=checked_whole("collisions", self.collisions),
@@ -155,7 +155,7 @@ class Unicycle:
         x, y in m, theta in rad.
     limits : Limits
     period : float
-        Control period in s, a tenth of a millisecond to ten seconds.
+        Control period in s, a millisecond to ten seconds.
 
     Raises
     ------
@@ -178,7 +178,7 @@ class Unicycle:
         return "Unicycle at ({:.2f}, {:.2f}, {:.2f})".format(*self.pose)
 
     def __init__(self, pose, limits=PIONEER_LIMITS, period=0.1):
-        self.limits = Limits(*checked_array("limits", limits, 4))
+        self.limits = Limits(*checked_array("limits", limits, 4, finite=False))
         self.period = checked_number("period", period, *PERIODS)
         self.place(pose)
 
@@ -258,7 +258,7 @@ def perform(
     kidnap : sequence of (float, (3,) sequence)
         At which times in s the robot is put at which poses.
     timeout : float
-        Give up after this time in s, and in any case after 100,000 control periods.
+        Give up after this time in s, and in any case after 10,000 s or a million control periods.
     localise_within : float
         Give up when the robot has not known where it is for this time in s. Until it knows, it
         turns on the spot, and moves off what it touches.
@@ -288,7 +288,7 @@ def perform(
     """
     check_choice("control", control, CONTROL_LAWS)
     avoid = checked_flag("avoid", avoid)
-    timeout = checked_number("timeout", timeout, SOONEST, np.inf)
+    timeout = min(checked_number("timeout", timeout, SOONEST, np.inf), LONGEST_RUN)
     localise_within = checked_number("localise_within", localise_within, SOONEST, np.inf)
     if background is not None:
         checked_record("background", background, OccupancyGrid)

@@ -401,9 +401,9 @@ def test_a_robot_whose_time_hardly_passes_is_given_up(task, monkeypatch):
     """Whatever the time-out, there is a last control period."""
     monkeypatch.setattr(performing, "MOST_PERIODS", 50)
     robot = Stuck(START)
-    robot.period = 1e-4
+    robot.period = 1e-3
     run = perform(task, robot, timeout=np.inf)
-    assert run.reason == "not finished within 50 periods of 0.0001 s" and len(run.t) == 51
+    assert run.reason == "not finished within 50 periods of 0.001 s" and len(run.t) == 51
 
 
 def test_half_a_kilometre_without_a_map(monkeypatch):
@@ -436,3 +436,19 @@ def test_clearance_is_that_of_each_periods_map():
     empty = ObstacleMap.of(Environment([]))
     clearance.add(2.0, 0.5, empty)
     assert clearance.all() == pytest.approx([*expected, empty.edge(2.0, 0.5)], abs=1e-4) and gone() is None
+
+
+class Unseen(Unicycle):
+    """A robot that nobody sees for a while: its own pose goes on, the measured one is NaN."""
+
+    @property
+    def true_pose(self):
+        return (np.nan,) * 3 if self.pose[0] < 4.0 else self.pose
+
+
+def test_a_run_that_was_not_seen_all_the_time_is_kept(task):
+    """Where nobody knew the pose its clearance is NaN too, and the run is what it was."""
+    run = perform(task, Unseen(START))
+    unknown = np.isnan(run.true_poses[:, 0])
+    assert run.finished and 0 < unknown.sum() < len(run.t) / 2
+    np.testing.assert_array_equal(np.isnan(run.clearance), unknown)
