@@ -191,7 +191,7 @@ def rows_of(seed, radii, control="pursuit", pictures=None):
 def is_failure(row):
     """Whether a row is no success: wrong, touched, crashed, or given up or refused where a way exists."""
     gave_up = row["outcome"] in ("not finished", "refused") and row["margin"] >= 0
-    return gave_up or row["outcome"] in ("wrong", "crashed", "not learned") or row.get("touched", False)
+    return gave_up or row["outcome"] in ("wrong", "crashed", "not learned") or row.get("touched") is True
 
 
 def summary(table):
@@ -250,17 +250,18 @@ def picture(room, task, row, run, radius, path):
 
 def words(row):
     """A failure in words."""
+    way = "no way exists" if row.get("margin", -1) < 0 else f"a way exists, {row['margin']:g} m wider than the robot"
     head = f"seed {row['seed']}, radius {row['radius']:g} m, {row['kind']} ({row['made']}): {row['outcome']}"
     if "clearance" not in row or pd.isna(row["clearance"]):
-        return head, str(row.get("reason", "")), f"way exists with margin {row.get('margin', np.nan):g} m"
+        return head, str(row.get("reason", "")), way
     told = f"clearance {row['clearance']:.3f} m, told {row['told_clearance']:.3f} m and {row['collisions']} collisions"
-    return head, str(row["reason"]), f"way exists with margin {row['margin']:g} m; {told}; {row['seconds']:.0f} s"
+    return head, str(row["reason"]), way, told, f"{row['seconds']:.0f} s"
 
 
 def write_failures(table, folder):
     """All failures as Markdown beside their pictures."""
     lines = ["# Failures", "", "```", summary(table).to_string(index=False), "", reasons(table).to_string(), "```", ""]
-    for row in table.to_dict("records"):
+    for row in table.sort_values(["outcome", "margin"], ascending=False).to_dict("records"):
         if is_failure(row):
             head, *rest = words(row)
             lines += [f"- **{head}** {'; '.join(rest)} ![]({row['seed']}_{row['radius']:g}.png)"]

@@ -162,7 +162,7 @@ def attempt(rng, seed, kind):
         return None
     moved = moved_boxes(rng, before, boxes, shown, made) if rng.random() < 0.5 else boxes
     background = as_map(rng, cells, frame)
-    now = Truth(moved, cells, frame)
+    now = Truth(moved, cells, frame if cells is not None else frame + OPEN * np.array([-1, -1, 1, 1]))
     return Room(seed, kind, background, before, now, Environment(boxes), Environment(moved), shown, made)
 
 
