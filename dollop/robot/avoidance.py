@@ -25,7 +25,7 @@ from dollop.checks import FARTHEST, checked_number, put_in
 from dollop.gridmap import distances_to, in_cells, in_metres
 
 __all__ = [
-    "AVOIDANCE",
+    "PIONEER_AVOIDANCE",
     "FREE_BELOW",
     "PIONEER_RADIUS",
     "Avoidance",
@@ -91,7 +91,7 @@ class Avoidance:
             raise ValueError(f"distances must be 0 < tight <= kept < influence, {got}")
 
 
-AVOIDANCE = Avoidance()
+PIONEER_AVOIDANCE = Avoidance()
 """As measured with a Pioneer."""
 
 
@@ -128,7 +128,7 @@ class ObstacleMap:
     origin: tuple
     resolution: float
     radius: float = PIONEER_RADIUS
-    rules: Avoidance = AVOIDANCE
+    rules: Avoidance = PIONEER_AVOIDANCE
 
     def __post_init__(self):
         if min(np.shape(self.distances), default=0) < 2 or np.ndim(self.distances) != 2:
@@ -152,7 +152,7 @@ class ObstacleMap:
         places=(),
         radius=PIONEER_RADIUS,
         resolution=0.05,
-        rules=AVOIDANCE,
+        rules=PIONEER_AVOIDANCE,
     ):
         """The obstacles of an environment before a background (reconstruction).
 

@@ -34,7 +34,7 @@ from dollop.robot.avoidance import Geodesic, towards
 
 __all__ = [
     "CONTROL_LAWS",
-    "FOLLOWING",
+    "PIONEER_FOLLOWING",
     "PIONEER_LIMITS",
     "STEP",
     "Following",
@@ -118,7 +118,7 @@ class Following:
         )
 
 
-FOLLOWING = Following()
+PIONEER_FOLLOWING = Following()
 """As measured with a Pioneer."""
 
 
@@ -221,7 +221,7 @@ class Guidance:
     True
     """
 
-    def __init__(self, law, obstacles=None, rules=FOLLOWING):
+    def __init__(self, law, obstacles=None, rules=PIONEER_FOLLOWING):
         self.obstacles = obstacles
         self._enough = max(rules.reach, obstacles.radius if obstacles else 0.0)
         self.goals = [tuple(segment.goal.tolist()) for segment in law.segments]
@@ -489,7 +489,7 @@ class Supervisor:
         Speed in m/s from which it can still brake in time.
     """
 
-    def __init__(self, guidance, speeds, robot, rules=FOLLOWING):
+    def __init__(self, guidance, speeds, robot, rules=PIONEER_FOLLOWING):
         self.guidance, self.limits, self.rules = guidance, robot.limits, rules
         self.period = self.elapsed = robot.period
         self.speeds = [float(speed) for speed in speeds]
@@ -630,7 +630,7 @@ class Pursuit(Supervisor):
     places = ((inf, inf),)  # no response yet: any pose is astray
     at = 0
 
-    def __init__(self, guidance, speeds, robot, rules=FOLLOWING):
+    def __init__(self, guidance, speeds, robot, rules=PIONEER_FOLLOWING):
         super().__init__(guidance, speeds, robot, rules)
         self.ahead = max(round(rules.look_ahead / STEP), 1)
 

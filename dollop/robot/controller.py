@@ -18,8 +18,8 @@ from dollop.checks import (
 )
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
-from dollop.robot.avoidance import AVOIDANCE, PIONEER_RADIUS, Avoidance, ObstacleMap
-from dollop.robot.control import CONTROL_LAWS, FOLLOWING, Following, Limits, clip
+from dollop.robot.avoidance import PIONEER_AVOIDANCE, PIONEER_RADIUS, Avoidance, ObstacleMap
+from dollop.robot.control import CONTROL_LAWS, PIONEER_FOLLOWING, Following, Limits, clip
 from dollop.robot.run import run_of
 from dollop.robot.ways import WayKeeper
 from dollop.sequenced_lds import SequencedLDS
@@ -110,8 +110,8 @@ class Controller:
         background=None,
         timeout=600.0,
         localise_within=120.0,
-        following=FOLLOWING,
-        avoidance=AVOIDANCE,
+        following=PIONEER_FOLLOWING,
+        avoidance=PIONEER_AVOIDANCE,
         places=(),
     ):
         check_choice("control", control, CONTROL_LAWS)

@@ -22,8 +22,8 @@ from dollop.checks import (
     told,
 )
 from dollop.pose import moved_pose
-from dollop.robot.avoidance import AVOIDANCE, PIONEER_RADIUS
-from dollop.robot.control import FOLLOWING, PIONEER_LIMITS, Limits, clip
+from dollop.robot.avoidance import PIONEER_AVOIDANCE, PIONEER_RADIUS
+from dollop.robot.control import PIONEER_FOLLOWING, PIONEER_LIMITS, Limits, clip
 from dollop.robot.controller import PERIODS, Controller, checked_radius
 
 __all__ = ["Unicycle", "perform"]
@@ -121,8 +121,8 @@ def perform(
     kidnap=(),
     timeout=600.0,
     localise_within=120.0,
-    following=FOLLOWING,
-    avoidance=AVOIDANCE,
+    following=PIONEER_FOLLOWING,
+    avoidance=PIONEER_AVOIDANCE,
 ):
     """Let a robot perform a task (Sec. III; Fig. 7, 10, 12).
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from dollop.checks import Note
 from dollop.robot.avoidance import Geodesic
-from dollop.robot.control import CONTROL_LAWS, FOLLOWING, STEP, Guidance
+from dollop.robot.control import CONTROL_LAWS, PIONEER_FOLLOWING, STEP, Guidance
 from dollop.trajectory import distance_to_polyline
 
 __all__ = ["Way", "WayKeeper", "counterpart", "extra_length", "fitting"]
@@ -270,7 +270,7 @@ class WayKeeper:
         Of the way in force.
     """
 
-    def __init__(self, laws, shown, robot, control, chart, avoid=True, rules=FOLLOWING):
+    def __init__(self, laws, shown, robot, control, chart, avoid=True, rules=PIONEER_FOLLOWING):
         self.ways = [Way(i, law, n) for i, (law, n) in enumerate(zip(laws, shown, strict=True))]
         self.robot, self.control, self.chart, self.avoid, self.rules = (
             robot,

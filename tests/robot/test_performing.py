@@ -14,7 +14,7 @@ from dollop import Demonstration, Task, robot
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.robot import avoidance, controller
-from dollop.robot.avoidance import AVOIDANCE, ObstacleMap
+from dollop.robot.avoidance import PIONEER_AVOIDANCE, ObstacleMap
 from dollop.robot.control import PIONEER_LIMITS, Limits
 from dollop.robot.controller import Search
 from dollop.robot.performing import Unicycle, perform
@@ -151,7 +151,7 @@ def test_distance_to_the_law(task, background, control, bound):
 def test_avoidance_leaves_a_free_run_as_it_is(task, control):
     """Where nothing is near, the run with avoidance is the run without."""
     runs = [perform(task, Unicycle(START), control, avoid) for avoid in (False, True)]
-    assert runs[0].clearance.min() > AVOIDANCE.influence
+    assert runs[0].clearance.min() > PIONEER_AVOIDANCE.influence
     assert (runs[0].poses == runs[1].poses).all()
 
 
