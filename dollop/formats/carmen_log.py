@@ -5,9 +5,7 @@ A log is text, one message per line: name, contents, time of the message in s, h
 log began.
 """
 
-import gzip
 import os
-from contextlib import nullcontext
 from functools import lru_cache, partial
 
 import numpy as np
@@ -27,7 +25,7 @@ from dollop.formats.scans import (
     no_return_from,
     usable_scans,
 )
-from dollop.formats.writing import whole_file
+from dollop.formats.writing import packed, whole_file
 from dollop.laser import LaserLog
 from dollop.pose import wrapped
 
@@ -324,7 +322,7 @@ def write_log(path, log):
         raise ValueError(f"the beams of a CARMEN log must be evenly spaced, these are up to {uneven:.3g} rad off")
     laser = " ".join(repr(float(value)) for value in (log.angles[0], fov, step, log.max_range))
     head = f"ROBOTLASER1 {UNKNOWN_TYPE} {laser} 0.001 0 {count}"
-    with whole_file(path, kind=CARMEN_LOG) as stream, _packed(stream, path) as text:
+    with whole_file(path, kind=CARMEN_LOG) as stream, packed(stream, path) as text:
         text.write(b"# CARMEN Logfile\n# distances in m, angles in rad, times in s\n")
         for t, ranges, pose in zip(log.t, _written_ranges(log), log.poses, strict=True):
             numbers = " ".join([f"{value:.3f}" for value in ranges.tolist()])
@@ -337,13 +335,6 @@ def _written_ranges(log):
     """Ranges that keep their meaning: distances stay in (0, max_range), nothing else reaches it."""
     below = (np.ceil(log.max_range * 1000 - 1e-6) - 1) / 1000
     return np.where(np.isinf(log.ranges), below + 0.001, np.clip(log.ranges, 0.001, below))
-
-
-def _packed(stream, path):
-    """The stream itself, or as gzip without name and time: the same log gives the same bytes."""
-    if str(path).endswith(".gz"):
-        return gzip.GzipFile(filename="", fileobj=stream, mode="wb", mtime=0)
-    return nullcontext(stream)
 
 
 def read_odometry(path):

@@ -255,7 +255,7 @@ def use_map(grid, path, rng):
     if localiser is not None:
         pushed(localiser.update, (0.0, 0.0, 0.0), small_scans().ranges[0])
         finite("a pose", localiser.pose, [np.nan])
-    suffix = pick(rng, (".map", ".yaml"))
+    suffix = pick(rng, (".map", ".map.gz", ".yaml"))
     again = read_again(grid.save, Path(path).with_name("again" + suffix), OccupancyGrid.load)
     if again is not None:
         check_map(again)
@@ -517,6 +517,7 @@ KINDS = {
     "carmen log": Kind(partial(carmen_logs, ".log"), read_any_log, use_log),
     "carmen log, packed": Kind(partial(carmen_logs, ".log.gz"), read_any_log, use_log),
     "carmen map": Kind(partial(carmen_maps, ".map"), read_any_map, use_map),
+    "carmen map, packed": Kind(partial(carmen_maps, ".map.gz"), read_any_map, use_map),
     "ros map, pgm": Kind(partial(ros_maps, ".pgm"), read_any_map, use_map),
     "ros map, png": Kind(partial(ros_maps, ".png"), read_any_map, use_map),
     "task 2, anchored": Kind(partial(tasks, "anchored"), read_any_task, use_task),
