@@ -287,8 +287,9 @@ def _numbers(fields):
 def write_log(path, log):
     """Write scans as a CARMEN log of ROBOTLASER1 messages, which state the laser's geometry.
 
-    Ranges are written to 1 mm and times to 1 us, as CARMEN does (`writelog.c`); poses in full, for
-    a microradian takes a beam along a cell's border to its other side. `inf` becomes the maximum
+    Ranges are written to 1 mm and times to 1 us, as CARMEN does (`writelog.c`), but a time that is
+    finer, as those of ROS are, in full: it is read back to the last digit. So are poses, for a
+    microradian takes a beam along a cell's border to its other side. `inf` becomes the maximum
     range. The log holds the laser only: its pose stands for the robot's too.
 
     Parameters
@@ -324,11 +325,17 @@ def write_log(path, log):
     head = f"ROBOTLASER1 {UNKNOWN_TYPE} {laser} 0.001 0 {count}"
     with whole_file(path, kind=CARMEN_LOG) as stream, packed(stream, path) as text:
         text.write(b"# CARMEN Logfile\n# distances in m, angles in rad, times in s\n")
-        for t, ranges, pose in zip(log.t, _written_ranges(log), log.poses, strict=True):
+        for t, ranges, pose in zip(log.t.tolist(), _written_ranges(log), log.poses, strict=True):
             numbers = " ".join([f"{value:.3f}" for value in ranges.tolist()])
             place = " ".join(map(repr, pose.tolist()))
-            ending = f"{place} {place} 0 0 0 0 0 {t:.6f} dollop {t - log.t[0]:.6f}"
+            ending = f"{place} {place} 0 0 0 0 0 {_written_time(t)} dollop {t - log.t[0]:.6f}"
             text.write(f"{head} {numbers} 0 {ending}\n".encode())
+
+
+def _written_time(t):
+    """A time in s as CARMEN writes it, or with as many digits as it takes to be read back."""
+    text = f"{t:.6f}"
+    return text if float(text) == t else repr(t)
 
 
 def _written_ranges(log):
