@@ -50,8 +50,8 @@ SMALLEST = 1e-6
 """m: a tolerance below that asks for more than coordinates can tell."""
 PERIOD = 0.1
 """s: control period for which is judged, as by `SequencedLDS.timed`, whether a task takes too long."""
-CLEAR = 0.01
-"""m: how far places on the edges are apart whose distance to objects is taken."""
+MOST_PLACES = 1_000_000
+"""Places of a way that are gone through: 50 km, five centimetres apart."""
 OVER = 0.1
 """m of way over which a direction is measured: less is noise of what was shown."""
 SINGLE = 1e-3
@@ -88,8 +88,8 @@ class Route:
         Largest distance in m, both ways, between an edge and what it stands for of the law's way as
         a robot follows it (`SequencedLDS.response`).
     clearance : float
-        Least distance in m between the edges and the task's objects, `inf` if there are none; below
-        or at zero where a way leads through one. Walls are not known here.
+        Least distance in m between the edges and the task's objects, `inf` if there are none; zero
+        where a way leads through one, which is noted. Walls are not known here.
     notes : tuple of Note
         Those of the task, and what else whoever drives it must know.
 
@@ -144,7 +144,7 @@ class Route:
             shown=tuple(checked_wholes("shown", self.shown, count).tolist()),
             shared=tuple(checked_array("shared", self.shared, count, least=0).tolist()),
             deviation=checked_number("deviation", self.deviation, 0),
-            clearance=checked_number("clearance", self.clearance, most=np.inf),
+            clearance=checked_number("clearance", self.clearance, 0, np.inf),
             notes=checked_records("notes", self.notes, Note),
         )
 
@@ -175,17 +175,17 @@ class Route:
         ------
         ValueError
             A task that lacks something, a tolerance or spacing below a micrometre, or a law that
-            takes longer than a million periods of 0.1 s.
+            takes longer than a million periods of 0.1 s, or has more places than that.
         """
         tolerance = checked_number("tolerance", tolerance, SMALLEST)
         spacing = checked_number("spacing", spacing, SMALLEST, np.inf)
         laws, shown = _laws_of(task)
         followed = [Followed.of(law, spacing) for law in laws]
-        chosen = [each.nodes(tolerance, spacing) for each in followed]
-        parts = [each.at(nodes, way) for way, (each, nodes) in enumerate(zip(followed, chosen, strict=True))]
-        columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        deviation = max(map(Followed.deviation, followed, chosen))
-        route = cls(**columns, shown=shown, shared=_shared(followed), deviation=deviation)
+        nodes = [each.nodes(tolerance, spacing) for each in followed]
+        columns = map(np.concatenate, zip(*map(Followed.at, followed, nodes), strict=True))
+        ways = np.repeat(np.arange(len(laws)), list(map(len, nodes)))
+        deviation = max(map(Followed.deviation, followed, nodes))
+        route = cls(*columns, ways, shown, _shared(followed), deviation)
         notes = checked_records("the task's notes", getattr(task, "notes", ()), Note)
         return replace(route, **_cleared(route, task.environment, notes))
 
@@ -250,9 +250,14 @@ class Followed:
         Raises
         ------
         ValueError
-            For one that takes longer than a million periods of 0.1 s.
+            For one that takes longer than a million periods of 0.1 s, or a million such places.
         """
-        lines = [_filled(line.places, spacing) for line in law.lines()]
+        lines = law.lines()
+        length = sum(line.way[-1] for line in lines)
+        if not length <= MOST_PLACES * spacing:
+            rule = f"the way of a route must have at most {MOST_PLACES} places"
+            raise ValueError(f"{rule}, got {length:.6g} m, {spacing:g} m apart")
+        lines = [_filled(line.places, spacing) for line in lines]
         speeds = law.speeds[:, None] if law.profile is None else law.profile
         when, _ = times_along(lines, speeds, waits_of(law))
         check_times(when[-1], PERIOD)
@@ -296,25 +301,24 @@ class Followed:
         spans = zip(nodes[:-1].tolist(), nodes[1:].tolist(), strict=True)
         return max(aside(self.places[i : j + 1]).max() for i, j in spans)
 
-    def at(self, nodes, way):
-        """The columns of a route at some nodes.
+    def at(self, nodes):
+        """What a route holds of some nodes.
 
         Parameters
         ----------
         nodes : (N,) int array
-        way : int
 
         Returns
         -------
-        dict of str to (N,) or (N, 2) array
+        places, headings, waits, t, subgoals, segments : tuple of (N, 2) and (N,) arrays
+            As of `Route`.
         """
-        numbers, waits, headings = np.full(len(self.t), -1), np.zeros(len(self.t)), self.headings()
+        numbers, waits = np.full(len(self.t), -1), np.zeros(len(self.t))
         numbers[self.ends] = np.arange(len(self.ends))
         waits[self.ends] = waits_of(self.law)
         segments = np.searchsorted(self.ends[1:], np.arange(len(self.t)))
-        columns = {"places": self.places, "headings": headings, "waits": waits, "t": self.t}
-        columns |= {"subgoals": numbers, "segments": segments, "ways": np.full(len(self.t), way)}
-        return {name: column[nodes] for name, column in columns.items()}
+        columns = self.places, self.headings(), waits, self.t, numbers, segments
+        return tuple(column[nodes] for column in columns)
 
     def headings(self):
         """Direction of the way at each place, within its segment, over a decimetre.
@@ -434,7 +438,10 @@ def _laws_of(task):
 
 def _shared(followed):
     """How far, in m, each way begins along one of those before it."""
-    return [max((_common(way, other) for other in followed[:k]), default=0.0) for k, way in enumerate(followed)]
+    shared = []
+    for k, way in enumerate(followed):
+        shared.append(max((_common(way, other) for other in followed[:k]), default=0.0))
+    return shared
 
 
 def _common(way, other):
@@ -447,27 +454,38 @@ def _common(way, other):
 
 
 def _cleared(route, environment, notes):
-    """Clearance of a route from objects, and the notes with those on objects that a way leads through."""
-    if not len(environment):
-        return {"notes": notes}
-    ends = np.split(route.places, np.flatnonzero(np.diff(route.ways)) + 1)
-    along = np.vstack([_filled(each, CLEAR) for each in ends])
-    clear = np.array([_to_box(along, box) for box in environment.boxes])
-    led = [
-        f"object {number} at ({along[at][0]:.2f}, {along[at][1]:.2f})"
-        for number, at in enumerate(clear.argmin(axis=1))
-        if clear[number, at] <= 0
-    ]
-    if led:
-        text = f"a way leads through {', '.join(led)}: who drives along it must go round"
-        notes = (*notes, Note("objects", text))
-    return {"clearance": float(clear.min()), "notes": notes}
+    """Clearance of a route from objects, and the notes, with one on those that a way leads through."""
+    ways = np.split(route.places, np.flatnonzero(np.diff(route.ways)) + 1)
+    clearance, through = np.inf, {}
+    for number, box in enumerate(environment.boxes):
+        for way in ways:
+            clearance = min(clearance, _box_distance(way, box))
+            for place in _entrances(way, box):
+                through.setdefault(number, f"object {number} at ({place[0]:.2f}, {place[1]:.2f})")
+    if through:
+        text = f"a way leads through {', '.join(through.values())}: what drives along it must go round"
+        return {"clearance": 0.0, "notes": (*notes, Note("objects", text))}
+    return {"clearance": clearance, "notes": notes}
 
 
-def _to_box(places, box):
-    """Distance (N,) in m from places (N, 2) to a box (4,), negative within it."""
-    outside = np.maximum(box[:2] - places, places - box[2:])
-    return np.hypot(*outside.clip(0).T) + outside.max(axis=1).clip(max=0)
+def _box_distance(way, box):
+    """Distance in m of a way (N, 2), edges included, from a box (4,) that no edge enters."""
+    corners = box[[[0, 1], [2, 1], [2, 3], [0, 3]]]
+    outside = np.maximum(box[:2] - way, way - box[2:]).clip(0)
+    return float(min(np.hypot(*outside.T).min(), distance_to_polyline(corners, way).min()))
+
+
+def _entrances(way, box):
+    """The places (P, 2) in m where edges of a way (N, 2) enter a box (4,), or touch it."""
+    steps, borders = np.diff(way, axis=0), box.reshape(2, 1, 2) - way[:-1]
+    within = (borders[0] <= 0) & (borders[1] >= 0)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        shares = np.sort(borders / steps, axis=0)
+    # An edge along a side passes no border: it is between them all along, or nowhere.
+    shares[:, steps == 0] = np.where(within, [[[-np.inf]], [[np.inf]]], np.inf)[:, steps == 0]
+    enters, leaves = shares[0].max(axis=1).clip(min=0), shares[1].min(axis=1).clip(max=1)
+    through = enters <= leaves
+    return way[:-1][through] + enters[through, None] * steps[through]
 
 
 class Target(NamedTuple):

@@ -5,6 +5,8 @@ the waypoints are those that Nav2's panel in RViz saves and loads (nav2_rviz_plu
 """
 
 import json
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 
@@ -75,13 +77,12 @@ def as_waypoints(route):
         *(f"  {name}: {_yaml(told[name])}" for name in ("deviation", "clearance", "trusted")),
         *_yaml_rows("  notes", told["notes"]),
     ]
-    ways = [[node for node in _nodes(route) if node["way"] == way] for way in range(len(route.shown))]
-    lines += ["waypoints:", *_waypoints(ways[0])]
-    if len(ways) > 1:
-        lines.append("other_ways:")
-    for way, nodes in enumerate(ways[1:], 1):
-        head = f"  - way: {way}", f"    shown: {route.shown[way]}", "    waypoints:"
-        lines += [*head, *(f"    {line}" for line in _waypoints(nodes))]
+    for way, nodes in groupby(_nodes(route), key=itemgetter("way")):
+        if way == 1:
+            lines.append("other_ways:")
+        head = [f"  - way: {way}", f"    shown: {route.shown[way]}"] if way else []
+        indent = "    " if way else ""
+        lines += [*head, *(indent + line for line in ["waypoints:", *_waypoints(nodes)])]
     return "\n".join(lines) + "\n"
 
 
