@@ -22,6 +22,7 @@ from dollop import (
     OccupancyGrid,
     Task,
     Unicycle,
+    export,
     learn,
     localise,
     observe,
@@ -318,6 +319,12 @@ def use_task(task, path, rng):
     if again is not None:
         check_task(again)
         same("the subgoals", again.law.subgoals, task.law.subgoals)
+    route = pushed(export, task, Path(path).with_name("route.geojson"), "nav2")
+    if route is not None:
+        json.loads(Path(path).with_name("route.geojson").read_text(), parse_constant=float)
+        finite("the route", np.column_stack([route.places, route.headings, route.waits, route.t]))
+        if not route.deviation <= 0.01:
+            raise Wrong(f"a route is {route.deviation} m from the law")
     if rng.random() < 0.1:
         run = pushed(perform, task, Unicycle((*task.law.start, 0.0)), timeout=5.0)
         if run is not None:
