@@ -7,9 +7,9 @@ waited, there is always a node. A span of the way from p_i to p_j becomes an edg
     max_n d(p_n, [p_i, p_j]) <= tolerance,    i <= n <= j,
 
 and is divided at its farthest place otherwise (U. Ramer 1972; D. Douglas and T. Peucker 1973). That
-bounds the distance in both directions: d(., edge) is convex, so no place of the span is farther from
-the edge than the farthest vertex; and the span goes without a gap from one end of the edge to the
-other, so every place of the edge is the one that is nearest to some place of the span.
+bounds the distance in both directions: d(., edge) is convex, so no place of the span is farther
+from the edge than the farthest vertex; and the span goes without a gap from one end of the edge to
+the other, so every place of the edge is the one that is nearest to some place of the span.
 """
 
 from collections.abc import Callable
@@ -45,11 +45,11 @@ from dollop.trajectory import arc_length, at_arc_length, distance_to_polyline
 __all__ = ["TARGETS", "TOLERANCE", "Route", "Target", "export", "export_outputs"]
 
 TOLERANCE = 0.01
-"""m: how far an edge may be from the way. A laser scanner's own error, and a fifth of a map's cell."""
+"""m: how far an edge may be from the way: a laser's own error, and a fifth of a map's cell."""
 SMALLEST = 1e-6
 """m: a tolerance below that asks for more than coordinates can tell."""
 PERIOD = 0.1
-"""s: control period for which is judged, as by `SequencedLDS.timed`, whether a task takes too long."""
+"""s: control period by which a task may take too long, as in `SequencedLDS.timed`."""
 MOST_PLACES = 1_000_000
 """Places of a way that are gone through: 50 km, five centimetres apart."""
 OVER = 0.1
@@ -67,8 +67,8 @@ class Route:
     places : (N, 2) float array
         Of the nodes, m: way after way, each in the order in which it is driven.
     headings : (N,) float array
-        Direction of the way there, over a decimetre, rad: at a subgoal that in which it arrives, at its
-        start that in which it leaves.
+        Direction of the way there, over a decimetre, rad: at a subgoal that in which it arrives, at
+        its start that in which it leaves.
     waits : (N,) float array
         How long is stood there, s.
     t : (N,) float array
@@ -133,12 +133,12 @@ class Route:
         count = int(ways.max(initial=-1)) + 1
         if not count or np.unique(ways).size != count or (np.diff(ways) < 0).any():
             raise ValueError("the nodes of a route must be in the order of its ways, from 0 on")
-        floats = {name: checked_array(name, getattr(self, name), len(places)) for name in ("headings", "waits", "t")}
+        for name in ("headings", "waits", "t"):
+            put_in(self, **{name: checked_array(name, getattr(self, name), len(places))})
         put_in(
             self,
             places=places,
             ways=ways,
-            **floats,
             subgoals=checked_wholes("subgoals", self.subgoals, len(places), least=-1),
             segments=checked_wholes("segments", self.segments, len(places)),
             shown=tuple(checked_wholes("shown", self.shown, count).tolist()),
@@ -342,7 +342,7 @@ class Followed:
 
 
 def _directions(places):
-    """From half a decimetre before to half a one behind each place of a segment (N, 2), in m; at its ends a whole."""
+    """Steps (N, 2) in m over a decimetre about each place (N, 2) of a segment, or up to its end."""
     way = arc_length(places)
     begins, ends = way - OVER / 2, way + OVER / 2
     ends[0], begins[-1] = OVER, way[-1] - OVER
@@ -454,7 +454,7 @@ def _common(way, other):
 
 
 def _cleared(route, environment, notes):
-    """Clearance of a route from objects, and the notes, with one on those that a way leads through."""
+    """Clearance of a route from objects, and notes with one on those that it leads through."""
     ways = np.split(route.places, np.flatnonzero(np.diff(route.ways)) + 1)
     clearance, through = np.inf, {}
     for number, box in enumerate(environment.boxes):
@@ -463,7 +463,8 @@ def _cleared(route, environment, notes):
             for place in _entrances(way, box):
                 through.setdefault(number, f"object {number} at ({place[0]:.2f}, {place[1]:.2f})")
     if through:
-        text = f"a way leads through {', '.join(through.values())}: what drives along it must go round"
+        where = ", ".join(through.values())
+        text = f"a way leads through {where}: what drives along it must go round"
         return {"clearance": 0.0, "notes": (*notes, Note("objects", text))}
     return {"clearance": clearance, "notes": notes}
 
@@ -605,12 +606,14 @@ def _not_told(route, to):
         return
     waits = int((route.waits > 0).sum())
     if waits:
-        text = f"Nav2 does not wait by itself: the {waits} waits are in the file, for what drives the robot to keep"
+        rule = "for what drives the robot to keep"
+        text = f"Nav2 does not wait by itself: the {waits} waits are in the file, {rule}"
         yield Note("waits", text, doubt=False)
     if to == "waypoints" and len(route.shown) > 1:
-        text = f"Nav2 loads the way shown most often; the other {len(route.shown) - 1} are in the file"
+        others = f"the other {len(route.shown) - 1} are in the file"
+        text = f"Nav2 loads the way shown most often; {others}"
         yield Note("ways", text, doubt=False)
     lost = np.abs(route.places - route.places.astype(np.float32)).max()
     if to == "nav2" and lost > SINGLE:
-        text = f"Nav2 keeps coordinates in single precision, which moves nodes by up to {lost:.3g} m"
+        text = f"Nav2 keeps coordinates in single precision: that moves nodes by up to {lost:.3g} m"
         yield Note("precision", text)

@@ -1,6 +1,6 @@
 """Routes as files that others read: a graph of Nav2, waypoints in YAML, a path as a table.
 
-The graph is the GeoJSON of Nav2's Route Server (nav2_route, its README and `GeoJsonGraphFileLoader`),
+The graph is the GeoJSON of Nav2's Route Server (nav2_route: its README, `GeoJsonGraphFileLoader`),
 the waypoints are those that Nav2's panel in RViz saves and loads (nav2_rviz_plugins).
 """
 
@@ -52,11 +52,11 @@ def as_graph(route):
 
 
 def as_waypoints(route):
-    """A route as poses in YAML, as Nav2's panel in RViz saves and loads waypoints (beyond the paper).
+    """A route as poses in YAML, as Nav2's panel in RViz loads waypoints (beyond the paper).
 
     Under `waypoints` each has a name, and under it `pose` x, y, z in m and `orientation`, a unit
-    quaternion w, x, y, z. What the panel passes over is beside it: `class`, `number` of the subgoal,
-    `wait` in s, and `t` in s. The way shown most often is under `waypoints`, the others under
+    quaternion w, x, y, z. What the panel passes over is beside it: `class`, `number` of the
+    subgoal, `wait` in s, and `t` in s. The way shown most often is under `waypoints`, the others under
     `other_ways`.
 
     Parameters
@@ -215,7 +215,7 @@ def _yaml_rows(name, texts):
 
 
 def _yaml(value):
-    """Numbers, rows of them, truth values and None: a float has a dot, or YAML takes it for text."""
+    """Numbers, rows of them, truth values and None: without a dot YAML takes a float for text."""
     if isinstance(value, list):
         return f"[{', '.join(map(_yaml, value))}]"
     text = _json(value)
