@@ -334,11 +334,7 @@ class Followed:
         x, y = np.vstack(steps).T
         moved = np.hypot(x, y) > SMALLEST
         known = np.maximum.accumulate(np.where(moved, np.arange(len(x)), 0))
-        found = wrapped(np.arctan2(y, x))[known]
-        shown = getattr(self.law, "headings", None)
-        if shown is not None:
-            found[self.ends] = shown
-        return found
+        return wrapped(np.arctan2(y, x))[known]
 
 
 def _directions(places):

@@ -148,6 +148,17 @@ def test_headings_are_directions_of_the_way():
     assert np.degrees(np.abs(off)).max() < 12 and (np.abs(circle.headings) <= np.pi).all()
 
 
+@pytest.mark.skipif(not hasattr(SequencedLDS, "headings"), reason="laws do not tell their headings")
+@pytest.mark.parametrize("seed", range(4))
+def test_headings_are_those_that_the_law_tells(seed):
+    """At the start and at every subgoal of each way."""
+    done = drawn(seed)
+    route = Route.of(done)
+    told = np.concatenate([law.headings for law in done.ways])
+    off = np.angle(np.exp(1j * (route.headings[route.subgoals >= 0] - told)))
+    assert np.abs(off).max() < 1e-6
+
+
 def test_ways_that_begin_together_say_how_far():
     """Two ways: nodes of each, no edge between them, and the metre that they share with what walks may differ."""
     route = Route.of(task(walk(BETWEEN), walk(ROUND), shown=(3, 1)))
