@@ -407,6 +407,17 @@ def test_a_task_that_was_saved_gives_the_same_route(tmp_path):
     np.testing.assert_allclose(route.waits, again.waits, atol=1e-9)
 
 
+def test_a_task_by_the_papers_method_has_a_route(tmp_path):
+    """A law without corners, waits or profile: as a robot that is Dollop's follows it, and as it is loaded again."""
+    done = stopped_task()
+    paper = Task.of(done.demonstrations[0], method="paper")
+    paper.save(tmp_path / "task.json")
+    for each in (paper, Task.load(tmp_path / "task.json")):
+        route = Route.of(each)
+        np.testing.assert_allclose(route.places[route.subgoals > 0], each.law.subgoals, atol=1e-12)
+        assert both_ways(dense(route.places), dense(each.law.response())) <= route.deviation + 1e-3 <= TOLERANCE + 1e-3
+
+
 def test_it_is_offered_by_the_library():
     """`dollop.export` and `dollop.Route`."""
     assert dollop.export is export and dollop.Route is Route and {"export", "Route"} <= set(dollop.__all__)
