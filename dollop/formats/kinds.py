@@ -10,8 +10,9 @@ from typing import NamedTuple
 from dollop.checks import shortened
 
 __all__ = [
-    "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "PGM", "PNG", "ROS_MAP", "SCENE", "TASK", "TRAJECTORY",
-    "TRUTH", "Kind", "check_no_map_names", "check_replaceable",
+    "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "PATH_TABLE", "PGM", "PNG", "ROS_MAP", "ROUTE_GRAPH",
+    "SCENE", "TASK", "TRAJECTORY", "TRUTH", "WAYPOINTS", "Kind", "check_no_map_names",
+    "check_replaceable",
 ]  # fmt: skip
 
 HEAD = 1 << 16
@@ -49,8 +50,13 @@ TRAJECTORY = Kind("a trajectory", rb"\At,x,y,occluded\r?\n")
 EVERYBODY = Kind("a table of everybody's trajectories", rb"\At,x,y,occluded,person\r?\n")
 TRUTH = Kind("the truth of a recording", _TRUTH)
 _BAG = Kind("a ROS bag", rb"\A(?:#ROSBAG|\x89MCAP|SQLite format 3)")
+_GRAPH = rb'\A\s*\{\s*"type": "FeatureCollection",\s*"name": "dollop route"'
+ROUTE_GRAPH = Kind("a route graph", _GRAPH)
+WAYPOINTS = Kind("waypoints", rb"\A# Dollop route: waypoints")
+PATH_TABLE = Kind("a path", rb"\A# Dollop route: way, t, x")
 
 _KNOWN = CARMEN_LOG, CARMEN_MAP, PGM, PNG, TASK, SCENE, TRAJECTORY, EVERYBODY, TRUTH, _BAG, ROS_MAP
+_KNOWN += ROUTE_GRAPH, WAYPOINTS, PATH_TABLE
 
 
 def check_replaceable(path, kind):
