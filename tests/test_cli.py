@@ -145,7 +145,7 @@ def test_an_interrupt_while_drawing_leaves_the_old_files(room, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dollop.cli._write_track", interrupted)
+    monkeypatch.setattr("dollop.cli.observing._write_track", interrupted)
     with pytest.raises(SystemExit) as end:
         main(["observe", "walk.log.gz", "room.yaml", "--tracks", "all.csv", "--min-area", "0.02"])
     assert end.value.code == 130 and content(room) == before
