@@ -1,4 +1,4 @@
-"""The command line: dollop map, observe, data, study; each command loads only what it needs."""
+"""The command line, from a log to a robot: each command is a module, and loads only what it needs."""
 
 import argparse
 import os
@@ -7,10 +7,12 @@ from importlib import import_module
 from pathlib import Path
 
 import dollop
-from dollop.cli.options import degrees, number, user, whole
+from dollop.cli.options import degrees, number, numbers, user, whole, wholes
 
 __all__ = ["in_one_line", "main", "replication"]
 
+LOG = "CARMEN log (.log, .log.gz, .clf) or ROS bag"
+MAP = "map: .yaml (ROS map_server) or .map (CARMEN)"
 STOPPED = 130
 """Exit status of a command that was interrupted: 128 and the number of the signal."""
 
@@ -83,45 +85,51 @@ def _parser():
     root = argparse.ArgumentParser(prog="dollop", description=about)
     root.add_argument("--version", action="version", version=f"dollop {dollop.__version__}")
     commands = root.add_subparsers(required=True, metavar="command")
-    log = argparse.ArgumentParser(add_help=False)
-    log.add_argument("log", help="CARMEN log (.log, .log.gz, .clf) or ROS bag")
-    log.add_argument("--topic", help="LaserScan topic of a bag, if there are several")
-    log.add_argument(
-        "--fov",
-        type=degrees,
-        metavar="DEGREES",
-        help="field of view, if the log does not state it",
-    )
+    log, json, watched = (argparse.ArgumentParser(add_help=False) for _ in range(3))
+    add = log.add_argument
+    add("--topic", help="LaserScan topic of a bag, if there are several")
+    fov = "field of view, if the log does not state it"
+    add("--fov", type=degrees, metavar="DEGREES", help=fov)
+    json.add_argument("--json", action="store_true", help="say it as one JSON object, for programs")
+    add = watched.add_argument
+    area = "smallest foreground object in m^2 (default: 0.01)"
+    add("--min-area", type=number, default=0.01, help=area)
 
     def command(run, name, help, *parents):
         parser = commands.add_parser(name, parents=parents, help=help)
         parser.set_defaults(run=run)
         return parser.add_argument
 
-    add = command("mapping", "map", "build a background map from a log with known poses", log)
-    add("map", help="what to write: .yaml (ROS map_server) or .map (CARMEN)")
+    add = command("mapping", "map", "build a background map from a log with known poses", log, json)
+    add("log", help=LOG)
+    add("map", help="what to write: .yaml (ROS map_server) or .map (CARMEN); a .png lands beside it")
     add("--resolution", type=number, default=0.05, help="m per cell (default: 0.05)")
-    add = command("observing", "observe", "track the user in a laser log", log)
-    add("map", help="background map: .yaml (ROS map_server) or .map (CARMEN)")
-    add(
-        "--user",
-        type=user,
-        default="fastest",
-        metavar="WHO",
-        help="fastest (default), a place X,Y or a number",
-    )
+    add = command("observing", "observe", "track the user in a laser log", log, watched, json)
+    add("log", help=LOG)
+    add("map", help=f"background {MAP}")
+    who = "fastest (default), a place X,Y or a number"
+    add("--user", type=user, default="fastest", metavar="WHO", help=who)
     add("--tracks", metavar="FILE", help="everybody's trajectories, a .csv")
-    add(
-        "--min-area",
-        type=number,
-        default=0.01,
-        help="smallest foreground object in m^2 (default: 0.01)",
-    )
-    add(
-        "--out",
-        default="user.csv",
-        help="the trajectory (default: user.csv); a .png lands beside it",
-    )
+    out = "the trajectory (default: user.csv); a .png lands beside it"
+    add("--out", default="user.csv", help=out)
+    _add_learn(command("learning", "learn", "learn a task from demonstrations", log, watched, json))
+    add = command("adapting", "adapt", "adapt a task to where objects stand now", log, watched, json)
+    add("task", help="a task, .json")
+    add("log", help=f"a look at the objects: {LOG}")
+    add("--map", required=True, help=f"background {MAP}")
+    which = "which object now each of the task's is, such as 1,0,-1 (-1: gone), where that is not sure"
+    add("--matching", type=wholes, metavar="N,...", help=which)
+    add("--turned", action="store_true", help="turn what is shown with the layout")
+    add("--out", required=True, metavar="TASK.json", help="the adapted task; may be the same file")
+    _add_perform(command("performing", "perform", "let a simulated robot perform a task", json))
+    add = command("showing", "show", "a picture and five lines of any file", log, json)
+    add("file", help="a log, map, task, run, scene, trajectory or route")
+    add("--map", help=f"draw it on this {MAP}")
+    add("--out", required=True, metavar="PICTURE.png", help="the picture")
+    add = command("exporting", "export", "a task as what other robots' software drives", json)
+    add("task", help="a task, .json")
+    add("--to", required=True, metavar="TARGET", help="nav2, waypoints or csv")
+    add("--out", required=True, metavar="FILE", help=".geojson, .yaml or .csv")
     add = command(_data, "data", "remake the recordings that the notebooks read")
     add("--folder", type=Path, default=Path("data"), help="where to write (default: data)")
     add = command(
@@ -141,6 +149,40 @@ def _parser():
     add("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     add("--folder", type=Path, help="for the table (default: study; study-quick with --quick)")
     return root, tuple(commands.choices)
+
+
+def _add_learn(add):
+    """The arguments of dollop learn."""
+    add("logs", nargs="+", metavar="log", help=f"a demonstration each: {LOG}")
+    add("--map", required=True, help=f"background {MAP}")
+    add("--out", required=True, metavar="TASK.json", help="the task; a .png lands beside it")
+    who = "fastest (default), a place X,Y or a number; once, or once for each log"
+    add("--user", type=user, action="append", metavar="WHO", help=who)
+    how = "anchored (default): in the frames of the objects; paper: as the paper does"
+    add("--method", choices=("anchored", "paper"), default="anchored", help=how)
+
+
+def _add_perform(add):
+    """The arguments of dollop perform."""
+    add("task", help="a task, .json")
+    add("--map", required=True, help=f"walls and furniture: {MAP}")
+    add("--out", required=True, metavar="RUN.csv", help="the run; a .png lands beside it")
+    add("--radius", type=number, default=0.25, metavar="M", help="of the robot in m (default: 0.25)")
+    limits = "speed in m/s, turn in rad/s and both accelerations (default: a Pioneer's, 0.5,0.8,0.5,1.57)"
+    add("--limits", type=numbers, default=(0.5, 0.8, 0.5, 1.57), metavar="V,W,A,B", help=limits)
+    add(
+        "--period",
+        type=number,
+        default=0.1,
+        metavar="S",
+        help="of the control loop in s (default: 0.1)",
+    )
+    how = "pursuit (default), or plain, the paper's kind"
+    add("--control", choices=("pursuit", "plain"), default="pursuit", help=how)
+    add("--kidnap", type=whole, default=0, metavar="N", help="put the robot N times somewhere else")
+    add("--seed", type=whole, default=0, help="of when and where to (default: 0)")
+    add("--timeout", type=number, default=600.0, metavar="S", help="give up after (default: 600 s)")
+    add("--film", metavar="FILE.gif", help="a film of it, too")
 
 
 def replication(module):

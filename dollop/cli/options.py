@@ -4,7 +4,7 @@ import argparse
 
 import numpy as np
 
-__all__ = ["degrees", "number", "user", "whole"]
+__all__ = ["degrees", "number", "numbers", "user", "whole", "wholes"]
 
 
 def number(text):
@@ -43,6 +43,44 @@ def whole(text):
         For what is none.
     """
     return int(text if text.isascii() and "_" not in text else "no number")
+
+
+def numbers(text):
+    """Numbers with commas between them.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    tuple of float
+
+    Raises
+    ------
+    ValueError
+        For what is none.
+    """
+    return tuple(map(number, text.split(",")))
+
+
+def wholes(text):
+    """Whole numbers with commas between them.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    tuple of int
+
+    Raises
+    ------
+    ValueError
+        For what is none.
+    """
+    return tuple(map(whole, text.split(",")))
 
 
 def degrees(text):
