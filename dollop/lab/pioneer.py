@@ -7,7 +7,7 @@ import numpy as np
 from dollop.lab.engine import STEPS_PER_SECOND
 from dollop.pose import motion_between, moved_pose
 from dollop.robot.control import PIONEER_LIMITS, Limits
-from dollop.robot.localization import MonteCarloLocalizer
+from dollop.robot.localization import PIONEER_LOCALISATION, MonteCarloLocalizer
 
 __all__ = ["Pioneer", "put_pioneer"]
 
@@ -44,9 +44,13 @@ class Pioneer:
         In m/s, rad/s, m/s^2, rad/s^2.
     scanner : Scanner, optional
         The laser, that of the scene's robot when not given; a scan is one control period.
+    rules : Localisation
+        By what it finds itself on the map.
 
     Attributes
     ----------
+    radius : float
+        Of a circle in m that covers it (ARIA, p2dx.p).
     limits : Limits
     period : float
         Control period in s.
@@ -68,6 +72,7 @@ class Pioneer:
 
     wheel_radius, wheel_base = 0.0825, 0.317
     motor_torque = 8.0
+    radius = 0.25
 
     def __init__(
         self,
@@ -79,6 +84,7 @@ class Pioneer:
         knows_start=True,
         limits=PIONEER_LIMITS,
         scanner=None,
+        rules=PIONEER_LOCALISATION,
     ):
         driving, self._sensing, guessing = np.random.default_rng(seed).spawn(3)
         self.world, self.limits = world, Limits(*limits)
@@ -94,7 +100,7 @@ class Pioneer:
             beams, offset = self.scanner.angles, world.scene.robot.laser_ahead
             start = pose if knows_start else None
             told = background, beams, environment, start, offset
-            self.localizer = MonteCarloLocalizer(*told, guessing)
+            self.localizer = MonteCarloLocalizer(*told, guessing, rules)
             self.drive(0.0, 0.0)  # a first scan
 
     @property

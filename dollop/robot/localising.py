@@ -27,24 +27,14 @@ from dollop.gridmap import OccupancyGrid, in_cells
 from dollop.laser import LaserLog
 from dollop.pose import between, composed, motion_between, poses_at, rotation, wrapped
 from dollop.robot.localization import (
-    BEAM_STEP,
-    DOUBTS,
-    FLOOR,
-    INDEPENDENT,
-    LOST,
-    SIGMA,
-    USUAL_FIT,
-    WIDE_SIGMA,
+    PIONEER_LOCALISATION,
+    Localisation,
     MonteCarloLocalizer,
     surface_cells,
 )
 
 __all__ = ["localise"]
 
-BEAMS = 60
-"""Beams of a scan that are used, about, spread evenly."""
-FITS = LOST * USUAL_FIT
-"""Mean q of a scan's beams from which on the map explains it."""
 ROUNDS = 10
 """Steps of Gauss and Newton."""
 KEYS, KEY_WAY = 20, 0.5
@@ -55,33 +45,27 @@ APART = 0.5, 0.35
 """m and rad: nearer than this, two places are one."""
 FREEDOM = 0.10
 """m and rad: standard deviation of a place that is tried."""
-CLOSE_SIGMA = 0.05
-"""m: of the field that chooses among places."""
-RIVAL, TOLD = 0.05, 0.10
-"""How much worse, in that field's mean q, the second best place must explain the scans, or the best is in
-doubt; and how much worse a place may that is told, or followed so far."""
+TOLD = 0.10
+"""How much worse than the best, in mean q of the close field, a place may explain the scans that is told, or
+followed so far."""
 HOPELESS = 0.20
 """How much worse than one that fits, or than the best, a place may be to be tried further, in mean q."""
 TRIES = 12
 """At how many places of a log the search begins anew, at most."""
 LEAST_ERROR = 0.0005
 """m and rad: of a step by odometry, however short."""
-CUT = 0.3
-"""m and rad: a step that differs so much from the odometry's was none: somebody carried the robot."""
-LOOSE = 0.20
-"""m: standard deviation along the weakest direction, of half of all scans, from which on there is a note."""
 BRIDGED = 0.15
 """m and rad: by how much the odometry may miss the next scan that is located, for those before it to be."""
 KERNEL = np.array([[-1.0], [0.0], [1.0]]) * np.ones((1, 3))
 """Of a cell and those round it: which lie ahead and which behind."""
 BORDER = 1.0
 """m round the map where beams may end."""
-TILE, HALO = 1024, 2.0
+TILE, HALO = 1024, 10
 """Cells along a side of the parts of a large map that are made ready when a beam ends there, and how
-many m round each count: ten standard deviations of the widest field, so that nothing farther pulls."""
+many standard deviations of the widest field round each count, so that nothing farther pulls."""
 
 
-def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
+def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0, rules=PIONEER_LOCALISATION):
     """The log with the laser's poses on a map, found by Monte Carlo localisation.
 
     The first pose by odometry is where the robot starts, if the first scans fit the map there; else it
@@ -100,6 +84,8 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
         Pose of the laser on the robot whose odometry it is: m, m and rad.
     seed : int or numpy.random.Generator
         Of the particles.
+    rules : Localisation
+        What the laser and the odometry are like, and what is believed.
 
     Returns
     -------
@@ -127,21 +113,20 @@ def localise(log, odometry, background, laser=(0.0, 0.0, 0.0), seed=0):
     """
     checked_record("log", log, LaserLog)
     checked_record("background", background, OccupancyGrid)
+    checked_record("rules", rules, Localisation)
     by_odometry = _laser_odometry(log, odometry, laser)
-    scans, follower = (
-        _Scans(log, background),
-        MonteCarloLocalizer(background, _thinned(log)[1], seed=seed),
-    )
+    scans = _Scans(log, background, rules)
+    follower = MonteCarloLocalizer(background, _thinned(log, rules)[1], seed=seed, rules=rules)
     search = _Search(scans, by_odometry, follower)
     course = _followed(log, search, by_odometry, follower)
     if not course.located.any():
-        rule = f"a scan fits if its beams do by {FITS:.2f} in the mean"
+        rule = f"a scan fits if its beams do by {rules.fits:.2f} in the mean"
         raise ValueError(f"the robot is nowhere on the map, of {len(log)} scans none could be localised: {rule}")
     poses, located = course.bridged()
     poses = scans.smoothed(poses, by_odometry, located)
     notes = [note for note in log.notes if note.kind != "poses"]
     loose = np.median(scans.looseness(poses)[course.located])
-    return replace(log, poses=poses, notes=(*notes, *_doubts(located, course.margin, loose)))
+    return replace(log, poses=poses, notes=(*notes, *_doubts(located, course.margin, loose, rules)))
 
 
 def _laser_odometry(log, odometry, laser):
@@ -160,15 +145,15 @@ def _laser_odometry(log, odometry, laser):
     return composed(poses_at(log.t, t, poses), mount)
 
 
-def _doubts(located, margin, loose):
+def _doubts(located, margin, loose, rules):
     """Notes on scans that are not located (T,), on a place hardly better than another, and on a loose hold in m."""
     if not located.all():
         text = f"{1 - located.mean():.1%} of the scans could not be localised: the map does not explain them"
         yield Note("poses", text)
-    if margin < RIVAL:
+    if margin < rules.rival:
         text = f"the map looks alike from another place: it explains the scans worse by {max(margin, 0):.2f} only"
         yield Note("poses", f"{text}, of a fit between 0 and 1")
-    if loose > LOOSE:
+    if loose > rules.loose:
         text = f"a scan holds the laser to {loose:.2g} m only along one direction, as in a corridor"
         yield Note("poses", f"{text}: along it the poses are the odometry's")
 
@@ -184,7 +169,11 @@ class _Course:
     """
 
     def __init__(self, log, by_odometry, follower):
-        self._ranges, self._by_odometry, self._follower = _thinned(log)[0], by_odometry, follower
+        self._ranges, self._by_odometry, self._follower = (
+            _thinned(log, follower.rules)[0],
+            by_odometry,
+            follower,
+        )
         self._last = None  # the last scan that a place was found for
         self.poses, self.located, self.margin = by_odometry.copy(), np.zeros(len(log), bool), np.inf
 
@@ -197,7 +186,7 @@ class _Course:
                 return i
             follower.update(motion_between(self._by_odometry[before], self._by_odometry[i]), self._ranges[i])
             if not follower.converged:
-                self.located[scans[max(0, count - DOUBTS + 1) : count]] = False
+                self.located[scans[max(0, count - follower.rules.doubts + 1) : count]] = False
                 return i
             self.poses[i], self.located[i], before = follower.pose, True, i
         return None
@@ -245,9 +234,9 @@ class _Course:
         return composed(self.poses[known], step)
 
 
-def _thinned(log):
-    """Ranges (T, M) and bearings (M,) of a log, of which the particles use one beam in `BEAM_STEP`."""
-    thin = max(1, round(len(log.angles) / (BEAMS * BEAM_STEP)))
+def _thinned(log, rules):
+    """Ranges (T, M) and bearings (M,) of a log, of which the particles use one beam in `beam_step`."""
+    thin = max(1, round(len(log.angles) / (rules.beams * rules.beam_step)))
     return log.ranges[:, ::thin], log.angles[::thin]
 
 
@@ -272,6 +261,7 @@ class _Search:
 
     def __init__(self, scans, by_odometry, follower):
         self._scans, self._by_odometry, self._follower = scans, by_odometry, follower
+        self._rules = follower.rules
 
     def place(self, scan, guess=None, followed=False):
         """Pose (3,) at a scan: near the guess if it explains the scans, else the best; None if none does.
@@ -279,16 +269,17 @@ class _Search:
         And how much better it is than any other, in mean q; `inf` if it was guessed. A robot that was followed
         so far is believed to be carried elsewhere only if the scans fit there as usual, and nowhere else.
         """
-        keys = self._keys(scan)
+        keys, rules = self._keys(scan), self._rules
         told = self._tried(np.reshape([] if guess is None else guess, (-1, 3)), keys)
-        if guess is not None and told[1][0] >= USUAL_FIT:
+        if guess is not None and told[1][0] >= rules.usual_fit:
             return told[0][0], np.inf
         poses, fits, close = map(np.concatenate, zip(told, self._tried(self._drawn(scan), keys), strict=True))
         best = close.argmax()
-        if guess is not None and fits[0] >= FITS - HOPELESS and close[0] >= close[best] - TOLD:
+        if guess is not None and fits[0] >= rules.fits - HOPELESS and close[0] >= close[best] - TOLD:
             return poses[0], np.inf
         margin = close[best] - close[_differ(poses, poses[best])].max(initial=0.0)
-        if fits[best] < FITS or (followed and not (fits[best] >= USUAL_FIT and margin >= RIVAL)):
+        sure = fits[best] >= rules.usual_fit and margin >= rules.rival
+        if fits[best] < rules.fits or (followed and not sure):
             return None, np.inf
         return poses[best], margin
 
@@ -316,18 +307,19 @@ class _Search:
         poses = self._scans.refined(poses, keys[0])
         first, fits, alive = poses, self._fits(poses, keys[0]), np.arange(len(poses))
         for tried, (before, key) in enumerate(zip(keys[:-1], keys[1:], strict=True), 1):
-            hopeless = tried * np.array([FITS - HOPELESS, fits[1].max(initial=0.0) / tried - HOPELESS])
+            hopeless = tried * np.array([self._rules.fits - HOPELESS, fits[1].max(initial=0.0) / tried - HOPELESS])
             alive = alive[(fits[:, alive] > hopeless[:, None]).all(axis=0)]
             told = composed(poses[alive], between(self._by_odometry[before], self._by_odometry[key]))
             poses = poses.copy()
             poses[alive] = self._scans.refined(told, key)
-            kept = (np.abs(between(told, poses[alive])) < CUT).all(axis=1)
+            kept = (np.abs(between(told, poses[alive])) < self._rules.carried).all(axis=1)
             fits[:, alive] += np.where(kept, self._fits(poses[alive], key), 0.0)
         return first, *fits / len(keys)
 
     def _fits(self, poses, scan):
         """Mean q of a scan's beams at poses (N, 3), as it is and for a narrow field, (2, N)."""
-        return np.array([self._scans.fits(poses, scan, sigma) for sigma in (SIGMA, CLOSE_SIGMA)])
+        sigmas = self._rules.sigma, self._rules.close_sigma
+        return np.array([self._scans.fits(poses, scan, sigma) for sigma in sigmas])
 
 
 def _differ(poses, pose):
@@ -342,15 +334,16 @@ def _differ(poses, pose):
 class _Scans:
     """Beam ends of a log, and the map as springs: `ends` (T, M, 2) in m, `back` (T, M) which there are."""
 
-    def __init__(self, log, background):
-        thin = max(1, round(len(log.angles) / BEAMS))
+    def __init__(self, log, background, rules):
+        self._rules = rules
+        thin = max(1, round(len(log.angles) / rules.beams))
         ranges, angles = log.ranges[:, ::thin], log.angles[::thin]
         self.back = np.isfinite(ranges)
         directions = np.column_stack([np.cos(angles), np.sin(angles)])
         self.ends = np.where(self.back, ranges, 0.0)[..., None] * directions
-        self._springs = _Springs(background)
+        self._springs = _Springs(background, rules)
 
-    def fits(self, poses, scan, sigma=SIGMA):
+    def fits(self, poses, scan, sigma):
         """Mean q (N,) of a scan's beams at poses (N, 3)."""
         back = self.back[scan]
         half, *_ = self._springs.at(_placed(poses, self.ends[scan][back])[0])
@@ -359,28 +352,28 @@ class _Scans:
     def refined(self, poses, scan):
         """Poses (N, 3), each moved to where it explains one scan best, not far from where it was told."""
         told, back = poses, self.back[scan][None]
-        for sigma in np.repeat([WIDE_SIGMA, SIGMA], ROUNDS // 2):
+        for sigma in np.repeat([self._rules.wide_sigma, self._rules.sigma], ROUNDS // 2):
             gradient, matrix = self._pulls(poses, self.ends[scan], back, sigma)
             gradient[:, 2] += wrapped(poses - told)[:, 2] / FREEDOM**2
             gradient[:, :2] += (poses - told)[:, :2] / FREEDOM**2
             matrix += np.eye(3) / FREEDOM**2
-            poses = _moved(poses, -np.linalg.solve(matrix, gradient[..., None])[..., 0])
+            poses = self._moved(poses, -np.linalg.solve(matrix, gradient[..., None])[..., 0])
         return poses
 
     def smoothed(self, poses, by_odometry, located):
         """Poses (T, 3) that explain all scans that are located and the steps between them best."""
         steps = between(by_odometry[:-1], by_odometry[1:])
-        spans = _step_errors(steps)
-        spans[(np.abs(between(poses[:-1], poses[1:]) - steps) > CUT).any(axis=1)] = np.inf
+        spans = _step_errors(steps, self._rules)
+        spans[(np.abs(between(poses[:-1], poses[1:]) - steps) > self._rules.carried).any(axis=1)] = np.inf
         back = self.back & located[:, None]
-        for sigma in np.repeat([SIGMA, CLOSE_SIGMA], ROUNDS):
+        for sigma in np.repeat([self._rules.sigma, self._rules.close_sigma], ROUNDS):
             gradient, matrix = self._pulls(poses, self.ends, back, sigma)
-            poses = _moved(poses, _banded_step(poses, gradient, matrix, steps, 1 / spans**2))
+            poses = self._moved(poses, _banded_step(poses, gradient, matrix, steps, 1 / spans**2))
         return poses
 
     def looseness(self, poses):
         """Standard deviation (T,) in m to which each scan alone holds its pose (T, 3) along the weakest direction."""
-        _, matrix = self._pulls(poses, self.ends, self.back, SIGMA)
+        _, matrix = self._pulls(poses, self.ends, self.back, self._rules.sigma)
         turn = matrix[:, :2, 2:]
         places = matrix[:, :2, :2] - turn @ np.swapaxes(turn, 1, 2) / (matrix[:, 2:, 2:] + 1e-9)
         return 1 / np.sqrt(np.linalg.eigvalsh(places)[:, 0].clip(1e-9))
@@ -390,7 +383,8 @@ class _Scans:
         points, arms = _placed(poses, ends)
         half, pull, normals = self._springs.at(points)
         q = np.exp(-half / sigma**2)
-        weights = INDEPENDENT / sigma**2 * back * (1 - FLOOR) * q / (FLOOR + (1 - FLOOR) * q)
+        share, floor = self._rules.independent, self._rules.floor
+        weights = share / sigma**2 * back * (1 - floor) * q / (floor + (1 - floor) * q)
         turns = np.stack([-arms[..., 1], arms[..., 0]], axis=-1)
         leaned = _times(normals, turns)
         gradient = np.concatenate([pull, (pull * turns).sum(axis=-1, keepdims=True)], axis=-1)
@@ -401,6 +395,13 @@ class _Scans:
         matrix[:, 2, 2] = np.einsum("nm,nmk,nmk->n", weights, leaned, turns)
         matrix[:, 1, 0], matrix[:, 2, :2] = matrix[:, 0, 1], matrix[:, :2, 2]
         return np.einsum("nm,nmk->nk", weights, gradient), matrix
+
+    def _moved(self, poses, step):
+        """Poses (N, 3) after steps, none longer than the wide field's standard deviation in m and rad."""
+        most = self._rules.wide_sigma
+        poses = poses + step.clip(-most, most)
+        poses[:, 2] = wrapped(poses[:, 2])
+        return poses
 
 
 def _placed(poses, ends):
@@ -415,17 +416,10 @@ def _times(normals, vectors):
     return np.stack([xx * x + xy * y, xy * x + yy * y], axis=-1)
 
 
-def _moved(poses, step):
-    """Poses (N, 3) after steps, none longer than `WIDE_SIGMA` in m and rad."""
-    poses = poses + step.clip(-WIDE_SIGMA, WIDE_SIGMA)
-    poses[:, 2] = wrapped(poses[:, 2])
-    return poses
-
-
-def _step_errors(steps):
+def _step_errors(steps, rules):
     """Standard deviations (N, 3) in m and rad of steps by odometry, as `moved_particles` has them."""
     way, turn = np.hypot(*steps[:, :2].T), np.abs(steps[:, 2])
-    return np.stack([0.10 * way, 0.05 * way, 0.10 * turn + 0.05 * way], axis=-1) + LEAST_ERROR
+    return np.stack(rules.errors(way, turn), axis=-1) + LEAST_ERROR
 
 
 def _banded_step(poses, gradient, matrix, steps, trust):
@@ -490,7 +484,8 @@ class _Springs:
     ends: 24 bytes a cell.
     """
 
-    def __init__(self, background):
+    def __init__(self, background, rules):
+        self._rules = rules
         self._border = int(np.ceil(BORDER / background.resolution))
         self._occupancy, self._frame = (
             background.occupancy,
@@ -529,9 +524,9 @@ class _Springs:
         """Fill in a tile."""
         begin = np.array(divmod(number, self._tiles[1])) * TILE
         end = np.minimum(begin + self._sides, self._shape)
-        halo = max(int(np.ceil(HALO / self._frame[1])), 8)
+        halo = max(int(np.ceil(HALO * self._rules.wide_sigma / self._frame[1])), 8)
         low, high = np.maximum(begin - halo, 0), np.minimum(end + halo, self._shape)
-        springs = _springs_of(self._window(low, high), self._frame[1])
+        springs = _springs_of(self._window(low, high), self._frame[1], self._rules.sigma)
         (top, left), (bottom, right) = begin - low, end - low
         tile = self._table.reshape(-1, *self._sides, 6)[number]
         tile[: bottom - top, : right - left] = springs[top:bottom, left:right]
@@ -545,11 +540,11 @@ class _Springs:
         return np.pad(inside, np.column_stack([first - low, high - last]))
 
 
-def _springs_of(occupancy, resolution):
+def _springs_of(occupancy, resolution, sigma):
     """The springs' numbers (H, W, 6) at the centres of cells (H, W)."""
     half = _half_squared_distances(occupancy, resolution).astype(np.float32)
     down, right = np.gradient(half, resolution)
-    q_down, q_right = np.gradient(np.exp(-half / SIGMA**2))
+    q_down, q_right = np.gradient(np.exp(-half / sigma**2))
     products = q_right * q_right, q_right * q_down, q_down * q_down
     xx, xy, yy = (scipy.ndimage.gaussian_filter(product, 1.0) for product in products)
     size = np.maximum(xx + yy, 1e-12)

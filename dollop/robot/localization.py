@@ -17,31 +17,26 @@ half of it, so a pose that was searched for is believed only when it has explain
 half a turn.
 """
 
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 import scipy
 
-from dollop.checks import checked_array, checked_generator
+from dollop.checks import (
+    checked_array,
+    checked_generator,
+    checked_number,
+    checked_record,
+    checked_whole,
+    put_in,
+)
 from dollop.gridmap import covered_cells, distances_to, in_cells, in_metres
 from dollop.pose import rotation
 from dollop.robot.avoidance import FREE_BELOW
 
-__all__ = [
-    "BEAM_STEP", "DOUBTS", "FLOOR", "INDEPENDENT", "LOST", "SIGMA", "USUAL_FIT", "WIDE_SIGMA", "MonteCarloLocalizer",
-    "surface_cells",
-]  # fmt: skip
+__all__ = ["PIONEER_LOCALISATION", "Localisation", "MonteCarloLocalizer", "surface_cells"]
 
-SIGMA, WIDE_SIGMA = 0.10, 0.20
-"""Standard deviations in m of the likelihood field: for particles, and for a lattice, which misses
-the true pose."""
-FLOOR, INDEPENDENT = 0.10, 0.3
-"""Likelihood of a beam that the map does not explain, and share of the beams that count: neighbours
-err together, where the map is wrong."""
-BEAM_STEP = 3
-"""Every which beam is used (CARMEN: one in three degrees)."""
-LATTICE, HEADINGS = 0.15, 72
-"""Distance in m between the poses of the lattice, and how many headings each place has."""
 MOST_POSES = 2_000_000
 """Poses of the lattice that are weighed, the most promising: as many as there are on 600 m^2 of
 floor. In a hall of 200 m there are a hundred million, of 50 bytes for a moment each."""
@@ -49,19 +44,156 @@ SQUARE = 4
 """Places of the lattice along the side of a square that is judged as a whole if there are many."""
 BLOCK = 1 << 18
 """Numbers that are looked up at once for the lattice."""
-TRACKING, SEARCHING = 250, 3000
-"""Numbers of particles: while they agree (CARMEN's), and while they do not."""
-STARTING, NARROW = 0.05, 0.15
-"""Standard deviations in m and rad: of particles round a pose that is told, and below which they
-agree."""
-BELIEVED_AFTER, GIVEN_UP_AFTER = pi, 2 * pi
-"""Angles in rad to turn until a pose that explains every scan is believed, and until the search
-starts anew."""
-LOST, DOUBTS = 0.65, 3
-"""Share of its long average below which the fit of a scan is in doubt, and how many scans in doubt,
-one after the other, make a kidnapping."""
-USUAL_FIT, FORGETTING = 0.8, 0.01
-"""Long average of the fit to begin with, and its gain per scan."""
+SHORTEST, LONGEST = 1e-3, 1e3
+"""m and rad: bounds of all lengths and angles of a `Localisation`."""
+LENGTHS = (
+    "sigma", "wide_sigma", "close_sigma", "lattice", "starting", "narrow", "believed_after", "given_up_after",
+    "carried", "loose",
+)  # fmt: skip
+MOST = 1_000_000
+COUNTS = {
+    "beam_step": MOST,
+    "beams": MOST,
+    "headings": 3600,
+    "tracking": MOST,
+    "searching": MOST,
+    "doubts": MOST,
+}
+"""Fields of a `Localisation`: the lengths and angles, and the most of what is counted."""
+
+
+@dataclass(frozen=True)
+class Localisation:
+    """By what a robot finds itself with odometry and laser, and when it believes that it has (reconstruction).
+
+    The defaults are those of a Pioneer 2 DX with a SICK LMS 200 in rooms. A laser that is less exact wants
+    a larger `sigma`, wheels that slip larger errors of the odometry.
+
+    Attributes
+    ----------
+    sigma, wide_sigma, close_sigma : float
+        Standard deviations in m of the likelihood field: for particles; for a lattice, which misses the
+        true pose; and to choose among places for a whole log.
+    floor : float
+        Likelihood, above 0 and below 1, of a beam that the map does not explain.
+    independent : float
+        Share of the beams that count: neighbours err together, where the map is wrong.
+    beam_step, beams : int
+        Every which beam of a scan is used (CARMEN: one in three degrees), and about how many of a log's.
+    lattice, headings : float, int
+        Distance in m between the places that are searched, and how many headings at each.
+    tracking, searching : int
+        Numbers of particles: while they agree (CARMEN's), and while they do not.
+    starting, narrow : float
+        Standard deviations in m and rad: of particles round a pose that is told, and below which they
+        agree.
+    believed_after, given_up_after : float
+        Angles in rad to turn until a pose that explains every scan is believed, and until the search
+        starts anew.
+    lost, doubts : float, int
+        Share of its long average below which the fit of a scan is in doubt, and how many such scans, one
+        after the other, make a kidnapping.
+    usual_fit, forgetting : float
+        Long average of the fit to begin with, and its gain per scan.
+    along, aside, turned, twisted : float
+        Standard deviations of a step by odometry: shares of its way, along it and across; share of its
+        turn; and rad per m of its way.
+    least_error : float
+        m and rad that are added to each of them for every control period.
+    carried : float
+        m and rad: a step in a log that differs so much from the odometry's was none: somebody carried
+        the robot.
+    rival : float
+        How much worse, in mean q, the second best place must explain a log's scans, or there is a note.
+    loose : float
+        Standard deviation in m along the weakest direction, of half of all scans of a log, from which on
+        there is a note.
+
+    Raises
+    ------
+    ValueError
+        For what is no number of its kind, or contradicts another: a kidnapping that is never noticed, a
+        search that is given up before anything is believed.
+
+    Examples
+    --------
+    One that never believes anything is refused.
+
+    >>> Localisation(believed_after=7.0)
+    Traceback (most recent call last):
+    ValueError: given_up_after must be at least believed_after, 7 rad, got 6.28319
+    """
+
+    sigma: float = 0.10
+    wide_sigma: float = 0.20
+    close_sigma: float = 0.05
+    floor: float = 0.10
+    independent: float = 0.3
+    beam_step: int = 3
+    beams: int = 60
+    lattice: float = 0.15
+    headings: int = 72
+    tracking: int = 250
+    searching: int = 3000
+    starting: float = 0.05
+    narrow: float = 0.15
+    believed_after: float = pi
+    given_up_after: float = 2 * pi
+    lost: float = 0.65
+    doubts: int = 3
+    usual_fit: float = 0.8
+    forgetting: float = 0.01
+    along: float = 0.10
+    aside: float = 0.05
+    turned: float = 0.10
+    twisted: float = 0.05
+    least_error: float = 0.002
+    carried: float = 0.3
+    rival: float = 0.05
+    loose: float = 0.20
+
+    def __post_init__(self):
+        self._check_numbers(SHORTEST, LONGEST, *LENGTHS)
+        self._check_numbers(SHORTEST, 1 - SHORTEST, "floor", "lost", "usual_fit")
+        self._check_numbers(0, 1, "independent", "forgetting", "rival")
+        self._check_numbers(0, LONGEST, "along", "aside", "turned", "twisted", "least_error")
+        for name, most in COUNTS.items():
+            put_in(self, **{name: checked_whole(name, getattr(self, name), 1, most)})
+        if self.given_up_after < self.believed_after:
+            rule = f"given_up_after must be at least believed_after, {self.believed_after:g} rad"
+            raise ValueError(f"{rule}, got {self.given_up_after:g}")
+
+    def _check_numbers(self, least, most, *names):
+        put_in(self, **{name: checked_number(name, getattr(self, name), least, most) for name in names})
+
+    @property
+    def fits(self):
+        """Float: mean q of a scan's beams from which on the map explains it."""
+        return self.lost * self.usual_fit
+
+    def errors(self, way, turn):
+        """Standard deviations of a step by odometry, without the least error.
+
+        Parameters
+        ----------
+        way, turn : float or (N,) float array
+            How far it goes in m and turns in rad, both positive.
+
+        Returns
+        -------
+        tuple of float or (N,) float array
+            Along it and across in m, and of the turn in rad.
+
+        Examples
+        --------
+        >>> tuple(round(error, 3) for error in Localisation().errors(1.0, 0.5))
+        (0.1, 0.05, 0.1)
+        """
+        return self.along * way, self.aside * way, self.turned * turn + self.twisted * way
+
+
+PIONEER_LOCALISATION = Localisation()
+"""Of a Pioneer 2 DX with a SICK LMS 200."""
 
 
 class MonteCarloLocalizer:
@@ -86,9 +218,12 @@ class MonteCarloLocalizer:
     laser_offset : float
         Laser ahead of the robot's centre of rotation in m.
     seed : int or numpy.random.Generator
+    rules : Localisation
+        What the laser and the odometry are like, and what is believed.
 
     Attributes
     ----------
+    rules : Localisation
     pose : (3,) float array
         Mean of the particles; NaN before the first scan if none was given.
     spread : (2,) float array
@@ -103,12 +238,24 @@ class MonteCarloLocalizer:
     Raises
     ------
     ValueError
-        If the pose is not finite, or the map has no free cell to search.
+        If the pose is not finite, the map has no free cell to search, or the rules are none.
     """
 
-    def __init__(self, background, angles, environment=None, pose=None, laser_offset=0.0, seed=0):
-        self._rng = checked_generator("seed", seed)
-        self._bearings = np.asarray(angles, dtype=float)[::BEAM_STEP]
+    def __init__(
+        self,
+        background,
+        angles,
+        environment=None,
+        pose=None,
+        laser_offset=0.0,
+        seed=0,
+        rules=PIONEER_LOCALISATION,
+    ):
+        self._rng, self.rules = (
+            checked_generator("seed", seed),
+            checked_record("rules", rules, Localisation),
+        )
+        self._bearings = np.asarray(angles, dtype=float)[:: rules.beam_step]
         self._laser_offset = laser_offset
         blocked, frame = background.occupied, (background.origin, background.resolution)
         if environment is not None:
@@ -117,8 +264,8 @@ class MonteCarloLocalizer:
         if not free.any():
             raise ValueError("the background must have a free cell to search, got none")
         self._surface, self._frame = surface_cells(blocked), frame
-        self._field, self._lattice = self._field_of(SIGMA), lattice(free, background)
-        self._usual_fit = USUAL_FIT
+        self._field, self._lattice = self._field_of(rules.sigma), lattice(free, background, rules)
+        self._usual_fit = rules.usual_fit
         self.pose, self.spread, self.fit = np.full(3, np.nan), np.full(2, np.inf), 0.0
         if pose is None:
             self.search()
@@ -126,7 +273,7 @@ class MonteCarloLocalizer:
             self.start(pose)
 
     def _field_of(self, sigma):
-        return LikelihoodField(distances_to(self._surface, self._frame[1]), sigma, *self._frame)
+        return LikelihoodField(distances_to(self._surface, self._frame[1]), sigma, *self._frame, self.rules.floor)
 
     @property
     def localised(self):
@@ -147,8 +294,9 @@ class MonteCarloLocalizer:
             If the pose is not finite.
         """
         self.pose = checked_array("pose", pose, 3)
-        self.spread, self.fit = np.full(2, STARTING), self._usual_fit
-        self.particles = self.pose + STARTING * self._rng.standard_normal((TRACKING, 3))
+        self.spread, self.fit = np.full(2, self.rules.starting), self._usual_fit
+        off = self._rng.standard_normal((self.rules.tracking, 3))
+        self.particles = self.pose + self.rules.starting * off
         self.converged, self._doubts = True, 0
 
     def search(self):
@@ -171,8 +319,8 @@ class MonteCarloLocalizer:
         if self.particles is None:
             self.particles = self._draw(ends)
         elif moved:
-            self.particles = moved_particles(self.particles, motion, self._rng)
-        weights = softmax(INDEPENDENT * self._field.log_likelihoods(self.particles, ends))
+            self.particles = moved_particles(self.particles, motion, self._rng, self.rules)
+        weights = softmax(self.rules.independent * self._field.log_likelihoods(self.particles, ends))
         self.pose, self.spread = mean_pose(self.particles, weights)
         self.fit = float(self._field.values(self.pose[None], ends).mean()) if len(ends) else 0.0
         if moved:  # the same view again would be no new evidence
@@ -181,22 +329,23 @@ class MonteCarloLocalizer:
 
     def _judge(self, turn):
         """Doubt a pose that was believed, or believe one searched for, after a turn in rad."""
-        fits = self.fit >= LOST * self._usual_fit
+        rules = self.rules
+        fits = self.fit >= rules.lost * self._usual_fit
         if self.converged:
             self._doubts = 0 if fits else self._doubts + 1
-            self._usual_fit += FORGETTING * (self.fit - self._usual_fit) if fits else 0.0
-            in_vain = self._doubts >= DOUBTS
+            self._usual_fit += rules.forgetting * (self.fit - self._usual_fit) if fits else 0.0
+            in_vain = self._doubts >= rules.doubts
         else:
             self._turned += turn
-            self._agreed = self._agreed + turn if fits and self.spread.max() < NARROW else 0.0
-            self.converged = self._agreed >= BELIEVED_AFTER
-            in_vain = not self.converged and self._turned > GIVEN_UP_AFTER
+            self._agreed = self._agreed + turn if fits and self.spread.max() < rules.narrow else 0.0
+            self.converged = self._agreed >= rules.believed_after
+            in_vain = not self.converged and self._turned > rules.given_up_after
         if in_vain:
             self.search()
 
     def _beam_ends(self, ranges):
         """Where the used beams end in the robot's frame: (M, 2) in m."""
-        ranges = ranges[::BEAM_STEP]
+        ranges = ranges[:: self.rules.beam_step]
         back = np.isfinite(ranges)
         directions = np.column_stack([np.cos(self._bearings[back]), np.sin(self._bearings[back])])
         return ranges[back, None] * directions + [self._laser_offset, 0.0]
@@ -219,10 +368,11 @@ class MonteCarloLocalizer:
             Which poses, ascending.
         scores : (N,) float array
         """
-        places, headings = self._lattice, np.arange(HEADINGS) * (2 * pi / HEADINGS)
-        field = self._field_of(WIDE_SIGMA)  # not kept: it is for the lost
-        some = [np.arange(len(places))] * HEADINGS
-        if len(places) * HEADINGS > MOST_POSES:
+        places, count = self._lattice, self.rules.headings
+        headings = np.arange(count) * (2 * pi / count)
+        field = self._field_of(self.rules.wide_sigma)  # not kept: it is for the lost
+        some = [np.arange(len(places))] * count
+        if len(places) * count > MOST_POSES:
             some = self._promising(field, headings, ends)
         scores = np.concatenate([*field.lattice_log_likelihoods(places, headings, ends, some)])
         return np.concatenate([k * len(places) + each for k, each in enumerate(some)]), scores
@@ -230,7 +380,7 @@ class MonteCarloLocalizer:
     def _promising(self, field, headings, ends):
         """Places (N_k,) of the lattice for each heading, those of the squares that promise most."""
         origin, resolution = self._frame
-        side = SQUARE * max(1, round(LATTICE / resolution))
+        side = SQUARE * max(1, round(self.rules.lattice / resolution))
         column, row = in_cells(*self._lattice.T, origin, resolution)
         squares = np.floor(np.column_stack([column, row])).astype(int) // side
         corners, square = np.unique(squares, axis=0, return_inverse=True)
@@ -256,19 +406,20 @@ class MonteCarloLocalizer:
             x, y in m, theta in rad.
         """
         heading, place = np.divmod(chosen, len(self._lattice))
-        return np.column_stack([self._lattice[place], heading * (2 * pi / HEADINGS)])
+        return np.column_stack([self._lattice[place], heading * (2 * pi / self.rules.headings)])
 
     def _draw(self, ends):
         """Particles (N, 3) from a scan: lattice poses by their likelihood, spread over meshes."""
+        rules = self.rules
         chosen, scores = self.lattice_scores(ends[::2])
-        weights = softmax(2 * INDEPENDENT * scores)
-        chosen = chosen[self._rng.choice(len(scores), SEARCHING, p=weights)]
-        mesh = [LATTICE, LATTICE, 2 * pi / HEADINGS]
-        return self.lattice_poses(chosen) + self._rng.uniform(-0.5, 0.5, (SEARCHING, 3)) * mesh
+        weights = softmax(2 * rules.independent * scores)
+        chosen = chosen[self._rng.choice(len(scores), rules.searching, p=weights)]
+        mesh = [rules.lattice, rules.lattice, 2 * pi / rules.headings]
+        return self.lattice_poses(chosen) + self._rng.uniform(-0.5, 0.5, (rules.searching, 3)) * mesh
 
     def _resampled(self, weights):
         """Particles (N, 3) drawn with the weights by one comb, few if they agree."""
-        count = TRACKING if self.spread.max() < NARROW else SEARCHING
+        count = self.rules.tracking if self.spread.max() < self.rules.narrow else self.rules.searching
         comb = (np.arange(count) + self._rng.random()) / count
         return self.particles[np.searchsorted(np.cumsum(weights), comb).clip(max=len(weights) - 1)]
 
@@ -286,9 +437,11 @@ class LikelihoodField:
         Lower left corner of the map in m.
     resolution : float
         Side of a cell in m.
+    floor : float
+        Likelihood of a beam that nothing explains.
     """
 
-    def __init__(self, distances, sigma, origin, resolution):
+    def __init__(self, distances, sigma, origin, resolution, floor=PIONEER_LOCALISATION.floor):
         self.reach = resolution * np.hypot(*distances.shape)  # no longer beam ends on the map
         # Cells are counted from where no beam ends; of that border, all alike, one cell is kept.
         self._border = int(np.ceil(self.reach / resolution)) + 2
@@ -296,8 +449,8 @@ class LikelihoodField:
         for row, away in zip(table[1:-1], distances, strict=True):
             row[1:-1] = np.exp(-0.5 * (away / sigma) ** 2)
         self.shape, self.table = table.shape, table.ravel()
-        self.log_table = (1 - FLOOR) * self.table
-        self.log_table += FLOOR
+        self.log_table = (1 - floor) * self.table
+        self.log_table += floor
         np.log(self.log_table, out=self.log_table)
         self.origin, self.resolution = np.array(origin) - self._border * resolution, resolution
         self.low = np.array(origin)
@@ -372,21 +525,17 @@ def surface_cells(blocked):
     return blocked & ~scipy.ndimage.binary_erosion(blocked, border_value=1)
 
 
-def lattice(free, background):
-    """Places (N, 2) in m every 15 cm in the free cells (H, W) of a map."""
-    stride = max(1, round(min(LATTICE / background.resolution, max(free.shape))))
+def lattice(free, background, rules):
+    """Places (N, 2) in m, as far apart as the rules have it, in the free cells (H, W) of a map."""
+    stride = max(1, round(min(rules.lattice / background.resolution, max(free.shape))))
     cells = np.argwhere(free[::stride, ::stride]) * stride
     return background.cell_centres(cells if len(cells) else np.argwhere(free))
 
 
-def moved_particles(particles, motion, rng):
-    """Particles (N, 3) after a motion (3,) by odometry, each with an error of its own.
-
-    Standard deviations: 10 % of the way and 2 mm along it, 5 % and 2 mm across; 10 % of the turn,
-    3 degrees per m and 0.1 degrees.
-    """
+def moved_particles(particles, motion, rng, rules):
+    """Particles (N, 3) after a motion (3,) by odometry, each with an error of its own, as the rules have it."""
     way, turn = np.hypot(*motion[:2]), motion[2]
-    errors = [0.10 * way + 0.002, 0.05 * way + 0.002, 0.10 * abs(turn) + 0.05 * way + 0.002]
+    errors = [error + rules.least_error for error in rules.errors(way, abs(turn))]
     ahead, left, turned = (rng.standard_normal((len(particles), 3)) * errors + motion).T
     x, y, theta = particles.T
     c, s = np.cos(theta + turn / 2), np.sin(theta + turn / 2)

@@ -17,7 +17,6 @@ from dollop.laser import LaserLog
 from dollop.pose import between, composed
 from dollop.robot import localising
 from dollop.robot.localising import (
-    CUT,
     KEYS,
     _banded_step,
     _Course,
@@ -27,8 +26,9 @@ from dollop.robot.localising import (
     _step_derivatives,
     _thinned,
 )
-from dollop.robot.localization import SIGMA, MonteCarloLocalizer
+from dollop.robot.localization import Localisation, MonteCarloLocalizer
 
+RULES = Localisation()
 ROOM = np.vstack([WALLS, FURNITURE])
 START = np.array([1.5, 2.2, 0.2])
 STEPS = np.column_stack([np.full(119, 0.05), np.zeros(119), 0.04 * np.sin(np.arange(119) / 15)])
@@ -93,9 +93,9 @@ def test_a_large_map_is_localised_on_tile_by_tile(background, monkeypatch):
     """Made of tiles, of which a beam may end in any, the springs are the same wherever anything pulls."""
     log = recorded(TRUTH, composed(FRAME, DRIFTING))
     points = np.random.default_rng(0).uniform(-3, 12, (300, 40, 2))
-    whole, (half, *pulls) = localise(log, None, background), _Springs(background).at(points)
+    whole, (half, *pulls) = localise(log, None, background), _Springs(background, RULES).at(points)
     monkeypatch.setattr(localising, "TILE", 50)
-    tiled = _Springs(background)
+    tiled = _Springs(background, RULES)
     assert len(tiled._made) == 20
     for one, other in zip((half, *pulls), tiled.at(points), strict=True):
         assert np.array_equal(one[half < 1.9], other[half < 1.9])
@@ -105,7 +105,7 @@ def test_a_large_map_is_localised_on_tile_by_tile(background, monkeypatch):
 def test_tiles_are_made_when_a_beam_ends_there(background, monkeypatch):
     """A robot in one corner of a hall needs but that."""
     monkeypatch.setattr(localising, "TILE", 50)
-    springs = _Springs(background)
+    springs = _Springs(background, RULES)
     springs.at(np.array([[0.2, 0.2], [0.3, 0.1]]))
     assert springs._made.sum() == 1
 
@@ -263,7 +263,10 @@ BAD = {
 def test_bad_input(background, message):
     """The error names the value and the rule."""
     with pytest.raises(ValueError, match=message):
-        localise(recorded(TRUTH, DRIFTING), **({"odometry": None, "background": background} | BAD[message]))
+        localise(
+            recorded(TRUTH, DRIFTING),
+            **({"odometry": None, "background": background} | BAD[message]),
+        )
 
 
 def test_a_map_without_a_free_cell():
@@ -292,13 +295,13 @@ def test_springs_pull_to_the_surface():
     """Beside a wall: half the squared distance, a slope across it, and a normal that does not lean."""
     wall = drawn_map([[2.0, 0.0, 2.0, 4.0]], 4.0, 4.0)
     points = np.array([[1.8, 2.0], [2.0, 2.0], [2.15, 1.0]])
-    half, slope, normal = _Springs(wall).at(points)
+    half, slope, normal = _Springs(wall, RULES).at(points)
     away = points[:, 0] - 2.0
     np.testing.assert_allclose(half, away**2 / 2, atol=2e-3)
     np.testing.assert_allclose(slope, np.column_stack([away, 0 * away]), atol=0.01)
     np.testing.assert_allclose(normal, np.tile([1.0, 0.0, 0.0], (3, 1)), atol=0.05)
-    far = _Springs(wall).at(np.array([[1e6, -1e6]]))[0]
-    assert np.exp(-far / SIGMA**2) < 1e-9
+    far = _Springs(wall, RULES).at(np.array([[1e6, -1e6]]))[0]
+    assert np.exp(-far / RULES.sigma**2) < 1e-9
 
 
 @pytest.mark.parametrize("beside", [0.0, 0.3, 1.0])
@@ -307,7 +310,7 @@ def test_a_surface_lies_between_the_cells_that_are_hit(beside):
     occupancy = np.zeros((40, 40))
     occupancy[:, 20], occupancy[:, 21] = 1.0, beside
     x = np.linspace(0.9, 1.15, 251)
-    half = _Springs(OccupancyGrid(occupancy, (0.0, 0.0), 0.05)).at(np.column_stack([x, np.ones(251)]))[0]
+    half = _Springs(OccupancyGrid(occupancy, (0.0, 0.0), 0.05), RULES).at(np.column_stack([x, np.ones(251)]))[0]
     middle = 0.05 * (20.5 + beside / (1 + beside))
     assert x[half <= half.min() + 2e-5].mean() == pytest.approx(middle, abs=0.0125)  # a quarter of a cell
 
@@ -316,7 +319,7 @@ def test_what_is_solid_ends_where_its_outer_cells_are():
     """The inside of a filled box draws nothing inwards."""
     occupancy = np.zeros((40, 40))
     occupancy[:, 20:30] = 1.0
-    half = _Springs(OccupancyGrid(occupancy, (0.0, 0.0), 0.05)).at(np.array([[20.5 * 0.05, 1.0], [0.8, 1.0]]))[0]
+    half = _Springs(OccupancyGrid(occupancy, (0.0, 0.0), 0.05), RULES).at(np.array([[20.5 * 0.05, 1.0], [0.8, 1.0]]))[0]
     np.testing.assert_allclose(np.sqrt(2 * half), [0.0, 0.225], atol=0.005)
 
 
@@ -336,7 +339,10 @@ def test_the_band_against_the_whole_matrix():
     """The step of Gauss and Newton is that of the dense normal equations."""
     rng = np.random.default_rng(1)
     poses, count = rng.normal(size=(6, 3)), 6
-    steps, trust = between(poses[:-1], poses[1:]) + 0.1 * rng.normal(size=(5, 3)), rng.uniform(1, 9, (5, 3))
+    steps, trust = (
+        between(poses[:-1], poses[1:]) + 0.1 * rng.normal(size=(5, 3)),
+        rng.uniform(1, 9, (5, 3)),
+    )
     gradient, root = rng.normal(size=(6, 3)), rng.normal(size=(6, 3, 3))
     matrix = root @ np.swapaxes(root, 1, 2)
     found = _banded_step(poses, gradient, matrix, steps, trust)
@@ -357,7 +363,7 @@ def test_smoothing_alone_finds_the_poses(background):
     """From poses 5 cm and 3 degrees off, each its own way, all scans together lead back."""
     log = recorded(TRUTH, DRIFTING)
     rough = TRUTH + np.random.default_rng(2).normal(0, [0.05, 0.05, 0.05], TRUTH.shape)
-    smooth = _Scans(log, background).smoothed(rough, DRIFTING, np.ones(len(log), bool))
+    smooth = _Scans(log, background, RULES).smoothed(rough, DRIFTING, np.ones(len(log), bool))
     place, _ = errors(replace(log, poses=smooth), TRUTH)
     assert place.mean() < 0.02 and place.max() < 0.08
 
@@ -365,8 +371,8 @@ def test_smoothing_alone_finds_the_poses(background):
 def test_keys_are_some_way_or_turn_apart(background):
     """Driving or turning, the scans through which a place is tried are spread; standing there is one."""
     log = recorded(TRUTH, DRIFTING)
-    scans = _Scans(log, background)
-    follower = MonteCarloLocalizer(background, _thinned(log)[1], seed=0)
+    scans = _Scans(log, background, RULES)
+    follower = MonteCarloLocalizer(background, _thinned(log, RULES)[1], seed=0)
     keys = _Search(scans, TRUTH, follower)._keys(10)
     assert keys[0] == 10 and 10 <= len(keys) <= KEYS
     way = np.cumsum(np.hypot(*STEPS[:, :2].T) + np.abs(STEPS[:, 2]))
@@ -377,10 +383,20 @@ def test_keys_are_some_way_or_turn_apart(background):
 def test_bridges(background):
     """Between two located scans that the odometry joins all are located; across a jump they are not."""
     log = recorded(TRUTH[:30], TRUTH[:30])
-    course = _Course(log, TRUTH[:30], MonteCarloLocalizer(background, _thinned(log)[1], seed=0))
+    course = _Course(log, TRUTH[:30], MonteCarloLocalizer(background, _thinned(log, RULES)[1], seed=0))
     course.poses[:], course.located[:] = TRUTH[:30], True
     course.located[[0, 1, 10, 11, 12, 20, 21, 29]] = False
-    course.poses[22:] = composed([2 * CUT, 0, 0], course.poses[22:])
+    course.poses[22:] = composed([2 * RULES.carried, 0, 0], course.poses[22:])
     poses, located = course.bridged()
     assert np.flatnonzero(~located).tolist() == [0, 1, 20, 21, 29]
     np.testing.assert_allclose(poses[:22], TRUTH[:22], atol=1e-12)
+
+
+def test_what_a_log_is_doubted_for_is_a_rule(background):
+    """Who asks that every scan alone holds the laser to 2 mm is told that it does not; the poses are the same."""
+    log = recorded(TRUTH[:30], DRIFTING[:30])
+    usual, strict = (localise(log, None, background, rules=Localisation(loose=loose)) for loose in (0.2, 0.002))
+    assert not usual.notes and "only along one direction" in strict.notes[0].text
+    assert np.array_equal(usual.poses, strict.poses)
+    with pytest.raises(ValueError, match="rules must be a Localisation, got 3"):
+        localise(log, None, background, rules=3)

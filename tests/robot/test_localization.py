@@ -11,13 +11,8 @@ from dollop.gridmap import OccupancyGrid
 from dollop.pose import motion_between
 from dollop.robot import localization
 from dollop.robot.localization import (
-    BELIEVED_AFTER,
-    FLOOR,
-    HEADINGS,
-    SEARCHING,
-    SIGMA,
-    TRACKING,
     LikelihoodField,
+    Localisation,
     MonteCarloLocalizer,
     lattice,
     mean_pose,
@@ -25,6 +20,7 @@ from dollop.robot.localization import (
     softmax,
 )
 
+RULES = Localisation()
 ROOM = np.vstack([WALLS, FURNITURE])
 START = np.array([4.5, 3.6, -0.7])
 WRONG = [1.03, 1.0, 0.97]  # what the odometry makes of a motion
@@ -77,7 +73,7 @@ def test_it_follows(background, boxes):
     assert np.hypot(*(truth[-1] - drifted)[:2]) > 0.20 > 10 * place[-1]
     assert place.mean() < 0.05 and np.degrees(turn.mean()) < 3
     assert believed.mean() > 0.97
-    assert len(localizer.particles) == TRACKING
+    assert len(localizer.particles) == RULES.tracking
 
 
 def test_it_finds_itself_anywhere(background):
@@ -114,7 +110,7 @@ def test_a_pose_is_not_believed_before_half_a_turn(background):
     standing = follow(localizer, START, np.zeros((30, 3)), rng)[2]
     assert not standing.any()
     believed = follow(localizer, START, TURNING, rng)[2]
-    assert believed.argmax() * 0.05 * 0.97 >= BELIEVED_AFTER - 0.1
+    assert believed.argmax() * 0.05 * 0.97 >= RULES.believed_after - 0.1
 
 
 def test_alike_from_two_sides():
@@ -179,23 +175,23 @@ def test_same_seed_same_pose(background):
 def test_field_against_the_formula(background):
     """Looked up or computed from its definition, the likelihood of a scan is the same."""
     grid = background.origin, background.resolution
-    field = LikelihoodField(background.distance_field(), SIGMA, *grid)
+    field = LikelihoodField(background.distance_field(), RULES.sigma, *grid)
     rng = np.random.default_rng(0)
     poses = np.column_stack([rng.uniform([1, 1], [8, 6], (20, 2)), rng.uniform(-3, 3, 20)])
     ends = rng.uniform(-1, 1, (9, 2))
     for pose, value in zip(poses, field.log_likelihoods(poses, ends), strict=True):
         turn = np.array([[np.cos(pose[2]), -np.sin(pose[2])], [np.sin(pose[2]), np.cos(pose[2])]])
         distances = background.distance_at(pose[:2] + ends @ turn.T)
-        q = np.where(np.isnan(distances), 0.0, np.exp(-0.5 * (distances / SIGMA) ** 2))
-        assert value == pytest.approx(np.log(FLOOR + (1 - FLOOR) * q).sum(), rel=1e-4)
+        q = np.where(np.isnan(distances), 0.0, np.exp(-0.5 * (distances / RULES.sigma) ** 2))
+        assert value == pytest.approx(np.log(RULES.floor + (1 - RULES.floor) * q).sum(), rel=1e-4)
 
 
 def test_beams_beyond_the_map_explain_nothing(background):
     """A beam that ends off the map, however far, counts the floor and breaks nothing."""
     grid = background.origin, background.resolution
-    field = LikelihoodField(background.distance_field(), SIGMA, *grid)
+    field = LikelihoodField(background.distance_field(), RULES.sigma, *grid)
     ends = np.array([[1e6, 0.0], [0.0, -50.0]])
-    assert field.log_likelihoods(START[None], ends) == pytest.approx([2 * np.log(FLOOR)])
+    assert field.log_likelihoods(START[None], ends) == pytest.approx([2 * np.log(RULES.floor)])
 
 
 def test_lattice_agrees_with_particles(background):
@@ -216,18 +212,18 @@ def test_the_lattice_counts_beams_that_end_beyond_the_map(background):
     places = np.random.default_rng(0).uniform([0, 0], [9, 7], (50, 2))
     for ends in ([[12.0, 0.0], [0.0, -50.0]], [[1e6, 0.0]], [[0.0, -9.5]]):
         (scores,) = field.lattice_log_likelihoods(places, [0.0], np.array(ends))
-        assert scores == pytest.approx(np.full(50, len(ends) * np.log(FLOOR)))
+        assert scores == pytest.approx(np.full(50, len(ends) * np.log(RULES.floor)))
 
 
 def test_of_many_poses_the_most_promising_are_weighed(background, monkeypatch):
     """Sixteen in a square: of as few as one in fifteen the best hundred of all are there, with their scores."""
     localizer, rng = MonteCarloLocalizer(background, ANGLES), np.random.default_rng(0)
-    few = len(localizer._lattice) * HEADINGS // 15
+    few = len(localizer._lattice) * RULES.headings // 15
     for _ in range(5):
         pose = np.array([*rng.uniform([1.0, 1.2], [8.0, 3.0]), rng.uniform(-np.pi, np.pi)])
         ends = localizer._beam_ends(scan(pose, ROOM, rng))[::2]
         every, scores = localizer.lattice_scores(ends)
-        assert np.array_equal(every, np.arange(len(localizer._lattice) * HEADINGS))
+        assert np.array_equal(every, np.arange(len(localizer._lattice) * RULES.headings))
         with monkeypatch.context() as patch:
             patch.setattr(localization, "MOST_POSES", few)
             chosen, weighed = localizer.lattice_scores(ends)
@@ -269,13 +265,13 @@ def test_a_localizer_takes_some_bytes_a_cell():
 
 def test_the_lattice_holds_free_places_fifteen_centimetres_apart(background):
     """Every third cell of 5 cm that is free; of a map too narrow for that all free cells."""
-    places = lattice(background.free, background)
+    places = lattice(background.free, background, RULES)
     assert background.free[tuple(background.world_to_cell(places).T)].all()
     for axis in (0, 1):
         np.testing.assert_allclose(np.diff(np.unique(places[:, axis].round(6))), 0.15)
     assert len(places) == pytest.approx(background.free.sum() / 9, rel=0.05)
     slit = OccupancyGrid(np.pad(np.zeros((1, 5)), 1, constant_values=1), (0.0, 0.0), 0.05)
-    assert len(lattice(slit.free, slit)) == 5
+    assert len(lattice(slit.free, slit, RULES)) == 5
 
 
 def test_motion_between_inverts_compose():
@@ -289,7 +285,7 @@ def test_motion_between_inverts_compose():
 def test_moved_particles_go_where_the_motion_leads():
     """Through a turn, their mean is the composed pose and their spread the stated one."""
     start, motion = np.array([1.0, -2.0, 0.7]), (0.4, 0.1, 1.0)
-    moved = moved_particles(np.tile(start, (20_000, 1)), motion, np.random.default_rng(0))
+    moved = moved_particles(np.tile(start, (20_000, 1)), motion, np.random.default_rng(0), RULES)
     np.testing.assert_allclose(moved.mean(axis=0), compose(start, motion), atol=0.005)
     c, s = np.cos(1.2), np.sin(1.2)
     way = np.hypot(0.4, 0.1)
@@ -307,7 +303,7 @@ def test_resampling_keeps_shares_and_a_robot_that_stands_keeps_its_particles(bac
     localizer.particles = np.arange(5.0)[:, None] * np.ones(3)
     weights = np.array([0.1, 0.0, 0.5, 0.15, 0.25])
     drawn = np.bincount(localizer._resampled(weights)[:, 0].astype(int), minlength=5)
-    assert drawn.sum() == TRACKING and np.abs(drawn - TRACKING * weights).max() <= 1
+    assert drawn.sum() == RULES.tracking and np.abs(drawn - RULES.tracking * weights).max() <= 1
 
 
 def test_the_laser_is_ahead_of_the_robot(background):
@@ -335,8 +331,53 @@ def test_scan_without_returns(background):
     """A scan in which nothing came back is survived, and believed to explain nothing."""
     localizer = MonteCarloLocalizer(background, ANGLES, seed=0)
     localizer.update((0.0, 0.0, 0.1), np.full(len(ANGLES), np.inf))
-    assert len(localizer.particles) == SEARCHING and localizer.fit == 0.0
+    assert len(localizer.particles) == RULES.searching and localizer.fit == 0.0
     assert np.isfinite(localizer.pose).all()
+
+
+def test_the_rules_are_the_robots_own(background):
+    """A robot that needs a whole turn to believe is not sure after half of one, and has its own particles."""
+    rules = Localisation(believed_after=6.2, searching=1500, beam_step=6)
+    localizer, rng = MonteCarloLocalizer(background, ANGLES, seed=0, rules=rules), np.random.default_rng(5)
+    localizer.update((0.0, 0.0, 0.0), scan(START, ROOM, rng))
+    assert len(localizer.particles) == 1500 and len(localizer._bearings) == 31
+    believed = follow(localizer, START, np.tile(TURNING, (2, 1)), rng)[2]
+    assert believed.any() and believed.argmax() * 0.05 * 0.97 >= 6.0
+
+
+def test_a_strange_odometry_is_followed_by_rules_that_know_it(background):
+    """Of an odometry 40 % off, the pose is lost by rules that trust it, and kept by those that do not."""
+    lost = []
+    for rules in (Localisation(), Localisation(along=0.5, turned=0.5)):
+        localizer, rng = (
+            MonteCarloLocalizer(background, ANGLES, pose=START, seed=0, rules=rules),
+            np.random.default_rng(1),
+        )
+        pose, off = START, []
+        for motion in DRIVING[:60]:
+            pose = compose(pose, motion)
+            localizer.update(motion * [1.4, 1.0, 0.6], scan(pose, ROOM, rng))
+            off.append(np.hypot(*(localizer.pose - pose)[:2]))
+        lost.append(np.mean(off))
+    assert lost[1] < lost[0] / 1.5
+
+
+BAD_RULES = {
+    "sigma must be in 0.001": {"sigma": 0.0},
+    "floor must be in 0.001 to 0.999": {"floor": 1.0},
+    "independent must be in 0 to 1": {"independent": 1.5},
+    "doubts must be a whole number": {"doubts": 2.5},
+    "headings must be a whole number, 1 to 3600": {"headings": 0},
+    "along must be a finite number": {"along": "much"},
+    "given_up_after must be at least believed_after, 5 rad, got 4": {"believed_after": 5, "given_up_after": 4},
+}
+
+
+@pytest.mark.parametrize("told", BAD_RULES)
+def test_rules_that_are_none(told):
+    """What is no number of its kind, or contradicts another, is refused with its name and rule."""
+    with pytest.raises(ValueError, match=told):
+        Localisation(**BAD_RULES[told])
 
 
 def test_bad_input(background):
@@ -345,3 +386,5 @@ def test_bad_input(background):
         MonteCarloLocalizer(background, ANGLES, pose=(np.nan, 0.0, 0.0))
     with pytest.raises(ValueError, match="free cell"):
         MonteCarloLocalizer(OccupancyGrid(np.ones((9, 9)), (0.0, 0.0), 0.05), ANGLES)
+    with pytest.raises(ValueError, match="rules must be a Localisation, got None"):
+        MonteCarloLocalizer(background, ANGLES, rules=None)

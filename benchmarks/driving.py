@@ -1,0 +1,301 @@
+"""How robots of any size perform tasks in rooms drawn at random: python -m benchmarks.driving
+
+    python -m benchmarks.driving [--radius 0.18 0.25 0.40] [--first 0] [--count 100] [--control pursuit|plain]
+        [--workers 2] [--out TABLE.csv] [--pictures FOLDER]
+
+A room, a walk of a person through it, the task that `dollop.learn` makes of it, at times adapted to moved objects, and
+a robot of each radius with limits and a control period of its own that begins near the start at any heading, and is
+kidnapped twice to places that are free for it (`benchmarks.furnished`). `dollop.perform` drives it.
+
+What came of it is judged by an oracle that knows nothing of how Dollop measures: exact distances to boxes and to
+occupied cells as squares, and a flood fill on a grid of 1.7 cm. A *way of that width exists* where the start, both
+kidnapping poses and a place within 0.25 m of each subgoal of one of the task's ways lie in one part of the floor that
+is nowhere nearer to anything than radius + margin; for the margins 0, 2, 5 and 6.7 cm.
+
+touched      the exact clearance was below zero somewhere
+told_error   the largest difference in m between the clearance told and the exact one, where one of both is below 0.5 m
+wrong        finished, but ended more than 0.3 m from the last subgoal, or not within 0.3 m of each of the last way's
+             subgoals one after the other (or, where it cannot come so near, 0.1 m more than it can)
+"""
+
+import argparse
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import joblib
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+import dollop
+from benchmarks.furnished import drawn
+
+MARGINS = 0.0, 0.02, 0.05, 0.067
+"""m."""
+REACH, NEAR = 0.25, 0.3
+"""m: within which a segment hands over, and within which a robot was at a subgoal."""
+FAR = 0.5
+"""m: beyond it a clearance tells nothing."""
+
+
+def task_of(room):
+    """The task that was shown in a room, adapted to its objects as they stand now."""
+    task = dollop.learn(room.shown)
+    if "moved" in room.made:
+        count = 4 * len(room.moved.boxes)
+        task = task.adapt(room.moved, dollop.Matching(np.arange(count), 0.0, np.inf, True))
+    return task
+
+
+def robot_in(room, task, radius):
+    """A robot near the start of the task, and two kidnappings (time, pose); None where it has no place to stand."""
+    rng = np.random.default_rng([room.seed, round(1000 * radius), 15])
+    limits = rng.uniform(0.2, 1.0), rng.uniform(0.5, 2.0), rng.uniform(0.2, 2.0), rng.uniform(0.5, 4.0)
+    period = float(rng.choice([0.02, 0.05, 0.1, 0.2]))
+    start = place_near(rng, room.now, task.law.start, radius)
+    places = room.now.random_places(rng, 2, radius + 0.005)
+    if start is None or len(places) < 2:
+        return None
+    length = np.hypot(*np.diff(task.law.response(), axis=0).T).sum()
+    lasting = 3.0 + length / min(limits[0], 0.8)
+    times = np.sort(rng.uniform(0.0, lasting, 2)).tolist()
+    headings = rng.uniform(-np.pi, np.pi, 3)
+    kidnap = [(t, (*place.tolist(), h)) for t, place, h in zip(times, places, headings[1:], strict=True)]
+    return dollop.Unicycle((*start.tolist(), headings[0]), limits, period, radius=radius), kidnap
+
+
+def place_near(rng, truth, place, radius):
+    """A place (2,) free for a radius within half a metre of another, or as near as is found."""
+    for spread in (0.15, 0.3, 0.5, 1.0, 2.0):
+        places = place + rng.normal(0, spread, (100, 2))
+        places = places[truth.distance(places) > radius + 0.005]
+        if len(places):
+            return places[0]
+    return None
+
+
+# ---- the oracle
+
+
+def margin_of(room, task, radius, poses):
+    """The largest margin with which a way of that width exists; -1 where none does."""
+    held = -1.0
+    for margin in MARGINS:
+        parts = room.now.parts(radius + margin)
+        common = set.intersection(*(room.now.part_at(parts, pose[:2]) for pose in poses))
+        if not any(connected(room.now, parts, common, way.subgoals) for way in task.ways):
+            break
+        held = margin
+    return held
+
+
+def connected(truth, parts, common, subgoals):
+    """Whether one of some parts of the floor comes within reach of each subgoal (K, 2)."""
+    for subgoal in subgoals:
+        common = common & truth.part_at(parts, subgoal, REACH)
+    return bool(common)
+
+
+def nearest_standing(truth, subgoal, radius):
+    """Distance in m from a subgoal to the nearest place where the robot touches nothing, of those within 2 m."""
+    x, y = truth.points
+    columns, rows = (np.flatnonzero(np.abs(each - at) < 2) for each, at in zip((x, y), subgoal, strict=True))
+    free = truth.clear[np.ix_(rows, columns)] >= radius
+    away = np.hypot(x[columns] - subgoal[0], y[rows, None] - subgoal[1])
+    return away[free].min(initial=2.0)
+
+
+def missed(room, run, task, radius):
+    """Why a run that says it finished did not, or nothing."""
+    way = int(run.way[-1])
+    subgoals, places = task.ways[way].subgoals, run.true_poses[:, :2]
+    if len(subgoals) > 1 and (run.way != way).any():  # what it had done on another way counts as done here
+        first = np.flatnonzero(run.way != way)[-1] + 1
+        skipped, places = int(run.active[first]), places[first:]
+    else:
+        skipped = 0
+    now = 0
+    for k in range(skipped, len(subgoals)):
+        away = np.hypot(*(places[now:] - subgoals[k]).T)
+        within = max(NEAR, 0.1 + nearest_standing(room.now, subgoals[k], radius))
+        if not (away <= within).any():
+            return f"subgoal {k} missed by {away.min():.2f} m"
+        now += int(np.argmax(away <= within))
+    return ""
+
+
+def judged(room, task, radius, control):
+    """One row of the table, and the run; the run is None where there is none."""
+    row = {"seed": room.seed, "radius": radius, "kind": room.kind, "made": ", ".join(room.made)}
+    ready = robot_in(room, task, radius)
+    if ready is None:
+        return row | {"outcome": "no place to stand"}, None
+    robot, kidnap = ready
+    poses = [robot.pose, *(pose for _, pose in kidnap)]
+    row |= {"margin": margin_of(room, task, radius, poses), "subgoals": len(task.law.subgoals), "period": robot.period}
+    began = time.perf_counter()
+    try:
+        run = dollop.perform(task, robot, control, background=room.background, kidnap=kidnap)
+    except Exception as error:
+        outcome = "refused" if isinstance(error, ValueError) else "crashed"
+        return row | {"outcome": outcome, "reason": f"{type(error).__name__}: {error}"}, None
+    took = time.perf_counter() - began
+    return row | measures(room, task, radius, run) | {"step_ms": 1e3 * took / len(run.t)}, run
+
+
+def measures(room, task, radius, run):
+    """What the oracle says of a run, and the run of itself."""
+    exact = room.now.distance(run.true_poses) - radius
+    near = (exact < FAR) | (run.clearance < FAR)
+    away = np.abs(run.clearance - exact)[near]
+    wrong = missed(room, run, task, radius) if run.finished else ""
+    found = {
+        "outcome": "wrong" if wrong else "finished" if run.finished else "not finished",
+        "reason": wrong or run.reason,
+        "touched": bool(exact.min() < 0),
+        "clearance": exact.min(),
+        "told_clearance": run.clearance.min(),
+        "told_error": away.max(initial=0.0),
+        "collisions": run.collisions,
+        "kidnapped": len(run.kidnapped),
+        "seconds": run.t[-1],
+        "periods": len(run.t),
+    }
+    with suppress(AttributeError):  # a run may tell more than it must
+        found |= {"done": run.done, "reached": int(np.sum(run.reached)), "farthest": run.farthest}
+        found["notes"] = "; ".join(note.kind for note in run.notes)
+    return found
+
+
+# ---- rows, tables, pictures
+
+
+def rows_of(seed, radii, control="pursuit", pictures=None):
+    """The rows of a seed, one for each radius."""
+    room = drawn(seed)
+    try:
+        task = task_of(room)
+    except ValueError as error:
+        told = {"kind": room.kind, "made": ", ".join(room.made), "outcome": "not learned", "reason": str(error)}
+        return [{"seed": seed, "radius": radius} | told for radius in radii]
+    rows = []
+    for radius in radii:
+        row, run = judged(room, task, radius, control)
+        rows.append(row)
+        if pictures and is_failure(row):
+            picture(room, task, row, run, radius, Path(pictures) / f"{seed}_{radius:g}.png")
+    return rows
+
+
+def is_failure(row):
+    """Whether a row is no success: wrong, touched, crashed, or given up or refused where a way exists."""
+    gave_up = row["outcome"] in ("not finished", "refused") and row["margin"] >= 0
+    return gave_up or row["outcome"] in ("wrong", "crashed", "not learned") or row.get("touched") is True
+
+
+def summary(table):
+    """One row per radius."""
+    return pd.DataFrame([of_radius(radius, part) for radius, part in table.groupby("radius")])
+
+
+def of_radius(radius, part):
+    """What came of the runs of one radius."""
+    ran = part[part.outcome.isin(["finished", "wrong", "not finished"])]
+    line = {"radius": radius, "runs": len(part), "driven": len(ran)}
+    for margin in MARGINS:
+        some = part[part.margin >= margin]
+        line[f"way_{100 * margin:g}cm"] = f"{(some.outcome == 'finished').sum()}/{len(some)}"
+    none = part[part.margin < 0]
+    line["no_way"] = ", ".join(f"{n} {name}" for name, n in none.outcome.value_counts().items())
+    line |= {"touched": int(ran.touched.sum()), "told_touched": int((ran.collisions > 0).sum())}
+    line |= {"wrong": int((part.outcome == "wrong").sum()), "crashed": int((part.outcome == "crashed").sum())}
+    line |= {"told_error": ran.told_error.max(), "step_ms": ran.step_ms.median(), "step_ms_max": ran.step_ms.max()}
+    return line | {"periods": int(ran.periods.sum())}
+
+
+def reasons(table):
+    """How often each reason was given, by radius and whether a way exists."""
+    told = table[table.outcome != "finished"].copy()
+    told["reason"] = told.reason.fillna("").str.replace(r"-?\d+(\.\d+)?", "#", regex=True)
+    told["way"] = told.margin >= 0
+    return told.groupby(["radius", "way", "outcome", "reason"]).size()
+
+
+def picture(room, task, row, run, radius, path):
+    """Draw what happened."""
+    figure, axes = plt.subplots(figsize=(8, 7))
+    truth = room.now
+    x, y = truth.points
+    shown = np.where(truth.clear <= 0, 2, np.where(truth.clear < radius, 1, 0))
+    axes.imshow(shown, origin="lower", extent=(x[0], x[-1], y[0], y[-1]), cmap="Greys", vmin=0, vmax=2.5)
+    for walks in (each.walks for each in room.shown):
+        axes.plot(*walks[0].T, "-", color="tab:blue", lw=0.8, label="shown")
+    for way in task.ways:
+        axes.plot(*way.subgoals.T, "*", color="tab:orange", ms=10, label="subgoals")
+        axes.plot(*way.start, "s", color="tab:orange", ms=6)
+    if run is not None:
+        places = run.true_poses[:, :2]
+        jumps = np.flatnonzero(np.hypot(*np.diff(places, axis=0).T) > 0.3) + 1
+        for part in np.split(places, jumps):
+            axes.plot(*part.T, "-", color="tab:red", lw=1, label="robot")
+            axes.plot(*part[0], "o", color="tab:green", ms=5)
+        axes.add_patch(plt.Circle(places[-1], radius, fill=False, color="tab:red"))
+        worst = places[truth.distance(places).argmin()]
+        axes.plot(*worst, "x", color="tab:purple", ms=9)
+    axes.set_title("\n".join(words(row)), fontsize=8, wrap=True)
+    figure.savefig(path, dpi=80)
+    plt.close(figure)
+
+
+def words(row):
+    """A failure in words."""
+    way = "no way exists" if row.get("margin", -1) < 0 else f"a way exists, {row['margin']:g} m wider than the robot"
+    head = f"seed {row['seed']}, radius {row['radius']:g} m, {row['kind']} ({row['made']}): {row['outcome']}"
+    if "clearance" not in row or pd.isna(row["clearance"]):
+        return head, str(row.get("reason", "")), way
+    told = f"clearance {row['clearance']:.3f} m, told {row['told_clearance']:.3f} m and {row['collisions']} collisions"
+    return head, str(row["reason"]), way, told, f"{row['seconds']:.0f} s"
+
+
+def write_failures(table, folder):
+    """All failures as Markdown beside their pictures."""
+    lines = ["# Failures", "", "```", summary(table).to_string(index=False), "", reasons(table).to_string(), "```", ""]
+    for row in table.sort_values(["outcome", "margin"], ascending=False).to_dict("records"):
+        if is_failure(row):
+            head, *rest = words(row)
+            lines += [f"- **{head}** {'; '.join(rest)} ![]({row['seed']}_{row['radius']:g}.png)"]
+    (Path(folder) / "failures.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def parsed(arguments=None):
+    """What the command line asks for."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.driving", description=__doc__.split("\n")[0])
+    parser.add_argument("--radius", type=float, nargs="+", default=[0.18, 0.25, 0.40], help="in m")
+    parser.add_argument("--first", type=int, default=0, help="seed")
+    parser.add_argument("--count", type=int, default=100, help="of seeds")
+    parser.add_argument("--control", default="pursuit", choices=["pursuit", "plain"])
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", help="table as CSV")
+    parser.add_argument("--pictures", help="folder for pictures of the failures")
+    return parser.parse_args(arguments)
+
+
+def main(arguments=None):
+    options = parsed(arguments)
+    if options.pictures:
+        Path(options.pictures).mkdir(parents=True, exist_ok=True)
+    seeds = range(options.first, options.first + options.count)
+    asked = (joblib.delayed(rows_of)(seed, options.radius, options.control, options.pictures) for seed in seeds)
+    rows = joblib.Parallel(options.workers)(asked)
+    table = pd.DataFrame([row for part in rows for row in part])
+    if options.out:
+        table.to_csv(options.out, index=False)
+    if options.pictures:
+        write_failures(table, options.pictures)
+    print(summary(table).to_string(index=False))
+    print(reasons(table).to_string())
+
+
+if __name__ == "__main__":
+    main()
