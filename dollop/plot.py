@@ -14,7 +14,7 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Ellipse, Polygon, Rectangle
 from matplotlib.patheffects import withStroke
@@ -30,10 +30,12 @@ LAW = "#009E73"  # green: the control law and its response
 SUBGOAL = "#000000"
 RUN = "#CC79A7"  # pink: where the robot went
 OCCLUDED = "#E69F00"  # orange: predictions while the user is occluded
+_WAIT = "#8A5A00"  # dark orange: times that are written beside a wait
 BACKGROUND = "#8C8C8C"  # grey: the background map, and how things were before
 TRUTH = "#56B4E9"  # light blue: where the user or an object really was
 ROBOT = "#F0E442"  # yellow
 _MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper
+LATER = LinearSegmentedColormap.from_list("later", ["#9ECAE9", "#08306B"])  # blue, darker with time
 _FLOOR = "#E8E8E8"  # palest grey: free floor of a map
 _RAY = "#C3CED6"  # pale grey: the laser's rays
 
@@ -448,15 +450,17 @@ def _follows(ax, task):
             label = None
 
 
-def _waits(ax, law):
-    """A ring, and the time in s, where the law waits."""
-    pauses = law.pauses if law.pauses is not None else np.zeros(len(law.segments) + 1)
+def _waits(ax, law, stood=()):
+    """A ring, and the time in s, where the law waits; with rows (W, 3) of `Run.waits` how long was stood."""
+    places = np.vstack([law.start, law.subgoals])
+    pauses = np.zeros(len(places)) if law.pauses is None else law.pauses
+    told = {int(k): f"{seconds:.1f} of {shown:.1f} s" for k, shown, seconds in stood}
     label = "waits"
-    for place, wait in zip(np.vstack([law.start, law.subgoals]), pauses, strict=True):
+    for k, (place, wait) in enumerate(zip(places, pauses, strict=True)):
         if wait > 0:
             look = {"color": OCCLUDED, "markersize": 16, "markeredgewidth": 2, "fillstyle": "none"}
             ax.plot(*place, "o", label=label, zorder=6, **look)
-            _write(ax, f"{wait:.1f} s", place, (11, -14), color="#8A5A00", weight="bold")
+            _write(ax, told.get(k, f"{wait:.1f} s"), place, (11, -14), color=_WAIT, weight="bold")
             label = None
 
 
@@ -481,7 +485,7 @@ def run(ax, run, task=None):
         ):
             if flags.any():
                 ax.plot(*way.subgoals[flags].T, "x", color=look, **_CROSS, label=f"subgoals, {label}")
-        _waits(ax, way)
+        _waits(ax, way, run.waits)
     places, leaps = run.true_poses[:, :2], _leaps(run)
     for n, part in enumerate(np.split(places, leaps)):
         path(ax, part, None if n else "robot", RUN, linewidth=1.6)
@@ -501,7 +505,7 @@ def run(ax, run, task=None):
             zorder=5,
             label="begin",
         )
-        robot(ax, known[-1], getattr(run, "radius", _RIM), "robot at the end")
+        robot(ax, known[-1], run.radius, "robot at the end")
 
 
 _CROSS = {"markersize": 9, "markeredgewidth": 2.5, "zorder": 6, "linestyle": "none"}
@@ -514,9 +518,8 @@ def _leaps(run):
 
 def _reached(run, way):
     """Which subgoals (K,) of a way a run reached, bool: what it says, or those before the segment at its end."""
-    told = getattr(run, "reached", None)
-    if told is not None and len(told) == len(way.segments):
-        return told
+    if len(run.reached) == len(way.segments):
+        return run.reached
     return np.arange(len(way.segments)) < (len(way.segments) if run.finished else run.active[-1])
 
 

@@ -1,4 +1,4 @@
-"""The command line, from a log to a robot: each command is a module, and loads only what it needs."""
+"""The command line, from a log to a robot: each command loads only what it needs."""
 
 import argparse
 import os
@@ -102,7 +102,7 @@ def _parser():
 
     add = command("mapping", "map", "build a background map from a log with known poses", log, json)
     add("log", help=LOG)
-    add("map", help="what to write: .yaml (ROS map_server) or .map (CARMEN); a .png lands beside it")
+    add("map", help="what to write: .yaml (ROS) or .map (CARMEN); a .png lands beside it")
     add("--resolution", type=number, default=0.05, help="m per cell (default: 0.05)")
     add = command("observing", "observe", "track the user in a laser log", log, watched, json)
     add("log", help=LOG)
@@ -113,11 +113,11 @@ def _parser():
     out = "the trajectory (default: user.csv); a .png lands beside it"
     add("--out", default="user.csv", help=out)
     _add_learn(command("learning", "learn", "learn a task from demonstrations", log, watched, json))
-    add = command("adapting", "adapt", "adapt a task to where objects stand now", log, watched, json)
+    add = command("adapting", "adapt", "a task where objects stand now", log, watched, json)
     add("task", help="a task, .json")
     add("log", help=f"a look at the objects: {LOG}")
     add("--map", required=True, help=f"background {MAP}")
-    which = "which object now each of the task's is, such as 1,0,-1 (-1: gone), where that is not sure"
+    which = "where each of the task's objects is now, by number, such as --matching=1,0,-1 (-1: gone)"
     add("--matching", type=wholes, metavar="N,...", help=which)
     add("--turned", action="store_true", help="turn what is shown with the layout")
     add("--out", required=True, metavar="TASK.json", help="the adapted task; may be the same file")
@@ -167,8 +167,8 @@ def _add_perform(add):
     add("task", help="a task, .json")
     add("--map", required=True, help=f"walls and furniture: {MAP}")
     add("--out", required=True, metavar="RUN.csv", help="the run; a .png lands beside it")
-    add("--radius", type=number, default=0.25, metavar="M", help="of the robot in m (default: 0.25)")
-    limits = "speed in m/s, turn in rad/s and both accelerations (default: a Pioneer's, 0.5,0.8,0.5,1.57)"
+    add("--radius", type=number, default=0.25, metavar="M", help="of the robot (default: 0.25 m)")
+    limits = "speed in m/s, turn in rad/s, their accelerations (default: 0.5,0.8,0.5,1.57, a Pioneer's)"
     add("--limits", type=numbers, default=(0.5, 0.8, 0.5, 1.57), metavar="V,W,A,B", help=limits)
     add(
         "--period",

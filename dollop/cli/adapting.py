@@ -31,7 +31,8 @@ def run(options):
         If it is not sure of any object which it is, or a place follows nothing that is left.
     """
     out, picture = outputs_of(options, ".json", "a task")
-    check_outputs([Output(out, TASK), Output(picture, PNG)], [options.log, *map_inputs(options.map)])
+    read = [options.log, *map_inputs(options.map)]
+    check_outputs([Output(out, TASK), Output(picture, PNG)], read)
     check_kind("TASK", options.task, [TASK], ("LOG", options.log))
     task = dollop.Task.load(options.task)
     log, background = (
@@ -58,7 +59,7 @@ def run(options):
 
 
 def _adapted(task, now, options, seen):
-    """The task among the objects now; where it cannot be, which there are and which there were is told."""
+    """The task among the objects now; where that is not sure, how to say it is told."""
     matching = None
     if options.matching is not None:
         check_matching(options.matching, task.environment, now)
@@ -69,9 +70,15 @@ def _adapted(task, now, options, seen):
         tell_notes(seen)
         if matching is not None:
             raise
-        before, after = _places(task.environment), _places(now)
-        found = f"say which is which with --matching, a number for each of {before}: of {after}, or -1"
-        raise ValueError(f"{str(error).split('; give matching=')[0]}; {found}") from None
+        why = str(error).split("; give matching=")[0]
+        raise ValueError(f"{why}; {_asked(task.environment, now)}") from None
+
+
+def _asked(before, now):
+    """How to say which object is which, beginning with what is most probable."""
+    probable = ",".join(map(str, dollop.match(before, now).partners.tolist()))
+    rule = "where each of the task's objects is now, -1 for one that is gone"
+    return f"say {rule}, as in --matching={probable}: then {_places(before)}; now {_places(now)}"
 
 
 def check_matching(partners, before, now):
@@ -93,7 +100,8 @@ def check_matching(partners, before, now):
         raise ValueError(f"{rule}, got {len(partners)}")
     wrong = [each for each in partners if not -1 <= each < len(now)]
     if wrong:
-        raise ValueError(f"--matching must be of the {len(now)} objects seen now, 0 to {len(now) - 1}, got {wrong[0]}")
+        rule = f"--matching must be of the {len(now)} objects seen now, 0 to {len(now) - 1}"
+        raise ValueError(f"{rule}, got {wrong[0]}")
 
 
 def _places(environment):

@@ -28,7 +28,8 @@ def run(options):
     check_kind("TASK", options.task, [TASK])
     route = export(dollop.Task.load(options.task), options.out, options.to)
     nodes, length = len(route.places), route.lengths.sum()
-    line = f"{nodes} places over {length:.1f} m, at most {1000 * route.deviation:.1f} mm from the way of the law"
+    near = f"at most {1000 * route.deviation:.1f} mm from the way of the law"
+    line = f"{nodes} places over {length:.1f} m, {near}"
     look = command("show", options.out, "--out", f"{options.out}.png")
     data = {
         "places": nodes,

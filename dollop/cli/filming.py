@@ -11,7 +11,7 @@ from dollop.robot.tables import rows_kidnapped
 __all__ = ["write_film"]
 
 FRAMES, FASTEST = 150, 0.05
-"""Frames of a film at most, and s that each is shown: browsers do not go faster than that everywhere."""
+"""Frames of a film at most, and s that each is shown: not every browser is faster."""
 LAST = 2.0
 """s for which the last frame is shown."""
 DPI = 90
@@ -55,7 +55,7 @@ def write_film(path, run, task, background=None):
 
 
 def _pace(run, frames):
-    """How much shorter than the run the film is: each frame takes `FASTEST`, or as long as it was."""
+    """By how much the film is shorter than the run: a frame takes `FASTEST`, or its time."""
     return min(1.0, FASTEST * frames / max(run.t[-1], 1e-9))
 
 
@@ -74,7 +74,7 @@ def _still(run, task, background):
         plot.path(ax, path[:1], "robot", plot.RUN, linewidth=2)
 
     with plot.style():
-        figure = plot.figure_of(draw)
+        figure = plot.figure_of(draw, title=" ")
         figure.set_dpi(DPI)
         figure.canvas.draw()
         image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
@@ -84,7 +84,7 @@ def _still(run, task, background):
 
 def _frame(still, to_pixels, run, row):
     """The picture with the way so far, and the robot where it was in a period."""
-    from PIL import ImageDraw
+    from PIL import ImageDraw, ImageFont
 
     from dollop import plot
 
@@ -98,7 +98,7 @@ def _frame(still, to_pixels, run, row):
             pen.line(list(map(tuple, to_pixels(part).tolist())), fill=plot.RUN, width=3)
     x, y, theta = so_far[-1]
     if np.isfinite(so_far[-1]).all():
-        radius = getattr(run, "radius", 0.25)
+        radius = run.radius
         ahead = [x + radius * np.cos(theta), y + radius * np.sin(theta)]
         (left, top), (right, bottom), middle, nose = to_pixels(
             [[x - radius, y + radius], [x + radius, y - radius], [x, y], ahead]
@@ -106,5 +106,6 @@ def _frame(still, to_pixels, run, row):
         pen.ellipse([left, top, right, bottom], fill=plot.ROBOT, outline="black", width=2)
         pen.line([*middle, *nose], fill="black", width=2)
     kidnapped = " kidnapped" if len(leaps) and (abs(run.t[leaps] - run.t[row]) < 1.0).any() else ""
-    pen.text((10, 8), f"{run.t[row]:.1f} s{kidnapped}", fill="black")
+    font = ImageFont.load_default(14)
+    pen.text((image.width / 2, 4), f"{run.t[row]:.1f} s{kidnapped}", "black", font, anchor="ma")
     return image

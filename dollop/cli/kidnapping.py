@@ -1,4 +1,4 @@
-"""Kidnappings drawn at random: from a seed, when, and to which free place that a robot could drive to."""
+"""Kidnappings drawn at random: when, and to which free place within reach."""
 
 import numpy as np
 import scipy
@@ -9,7 +9,7 @@ from dollop.robot import ObstacleMap
 __all__ = ["draw_kidnappings", "reachable"]
 
 ROOM = 0.1
-"""m between the robot's edge and all that stands there, where it is put and on the ways from there."""
+"""m between the robot's edge and all that stands there, where it is put and on its way."""
 
 
 def draw_kidnappings(count, seconds, task, background, start, radius, seed):

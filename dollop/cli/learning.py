@@ -28,7 +28,8 @@ def run(options):
         If nobody walks in one of the logs, or there is another number of users than of logs.
     """
     out, picture = outputs_of(options, ".json", "a task")
-    check_outputs([Output(out, TASK), Output(picture, PNG)], [*options.logs, *map_inputs(options.map)])
+    read = [*options.logs, *map_inputs(options.map)]
+    check_outputs([Output(out, TASK), Output(picture, PNG)], read)
     users = _users(options)
     background = load_map(options.map, options.logs[0])
     pairs = zip(options.logs, users, strict=True)
@@ -38,14 +39,16 @@ def run(options):
     write_task(task, background, out, picture)
     lines = (*_shown_lines(task, options.logs), *as_lines(task))
     data = {**as_data(task), "errors": task.errors()}
-    tell(Result(lines, (out, picture), performing(out, options.map), task.notes, data), options.json)
+    then = performing(out, options.map)
+    tell(Result(lines, (out, picture), then, task.notes, data), options.json)
 
 
 def _users(options):
     """Who the user of each log is."""
     users, logs = options.user or ["fastest"], options.logs
     if len(users) not in (1, len(logs)):
-        raise ValueError(f"--user must be given once, or once for each of {len(logs)} logs, got {len(users)}")
+        rule = f"--user must be given once, or once for each of {len(logs)} logs"
+        raise ValueError(f"{rule}, got {len(users)}")
     return users * len(logs) if len(users) == 1 else users
 
 
@@ -65,7 +68,8 @@ def _shown_lines(task, paths):
     for path, shown, error in zip(paths, task.demonstrations, task.errors(), strict=True):
         walked = sum(arc_length(walk)[-1] for walk in shown.walks)
         laps = f" in {len(shown.walks)} laps" if len(shown.walks) > 1 else ""
-        near = "set aside" if np.isnan(error) else f"the task is {1000 * error:.0f} mm from it on average"
+        apart = f"the task is {1000 * error:.0f} mm from it on average"
+        near = "set aside" if np.isnan(error) else apart
         yield f"{path}: {walked:.1f} m walked{laps} among {len(shown.environment)} objects; {near}"
 
 
@@ -85,7 +89,8 @@ def as_lines(task):
     waits = _waits(task.law)
     stops = f", waits {', '.join(f'{seconds:.1f} s' for _, seconds in waits)}" if waits else ""
     objects = f"{len(task.environment)} objects"
-    return (f"a task of {len(task.law.segments)} subgoals over {length:.1f} m{ways}{stops}, among {objects}",)
+    way = f"{len(task.law.segments)} subgoals over {length:.1f} m{ways}{stops}"
+    return (f"a task of {way}, among {objects}",)
 
 
 def _waits(law):

@@ -33,7 +33,8 @@ def run(options):
         *(each.path for each in outputs if str(each.path) != options.map),
         picture,
     ]
-    look = command("show", options.log, "--map", options.map, "--out", _beside(options.map, "_log.png"))
+    look = _beside(options.map, "_log.png")
+    look = command("show", options.log, "--map", options.map, "--out", look)
     tell(Result(_lines(grid, options.map), written, look, log.notes, _data(grid)), options.json)
 
 
@@ -50,7 +51,7 @@ def _lines(grid, path):
     size = f"{columns * grid.resolution:.1f} m x {rows * grid.resolution:.1f} m"
     then = command("learn", "WALK.log", "--map", path, "--out", "task.json")
     return (
-        f"a map of {size}, {grid.free.mean():.0%} of it free floor, at {grid.resolution:g} m per cell",
+        f"a map of {size}, {grid.free.mean():.0%} of it free, at {grid.resolution:g} m per cell",
         f"with a log in which somebody walks: {then}",
     )
 

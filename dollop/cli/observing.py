@@ -34,7 +34,8 @@ def run(options):
     found = watched(log, background, options.user, options.min_area)
     if found.user is None:
         tell_notes(found.notes)
-        raise ValueError(f"nobody walks in {options.log}; tracks of something else: {len(found.tracks)}")
+        others = f"tracks of something else: {len(found.tracks)}"
+        raise ValueError(f"nobody walks in {options.log}; {others}")
     with together():
         if options.tracks:
             _write_people(found.people, options.tracks)
@@ -87,7 +88,7 @@ def _next(options):
 
 
 def said(options):
-    """The options of the command line by which a log is read and observed, where they are not the usual ones.
+    """The options by which a log is read and observed, where they are not the usual ones.
 
     Parameters
     ----------
@@ -111,7 +112,8 @@ def _who(user):
 def _write_track(user, path):
     """The user's trajectory as a table."""
     with whole_file(path, "w", TRAJECTORY) as stream:
-        csv.writer(stream, lineterminator="\n").writerows([("t", "x", "y", "occluded"), *_rows(user)])
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerows([("t", "x", "y", "occluded"), *_rows(user)])
 
 
 def _write_people(people, path):

@@ -46,7 +46,7 @@ def run(options):
                 write_film(film, done, task, background)
         write_picture(picture, of_run(done, task, background))
         save_run(out, done)
-    notes = tuple(dict.fromkeys((*task.notes, *getattr(done, "notes", ()))))
+    notes = tuple(dict.fromkeys((*task.notes, *done.notes)))
     written = [each for each in (out, picture, film) if each]
     failed = "" if done.finished else done.reason
     tell(
@@ -87,9 +87,8 @@ def _performed(task, background, count, seed, options):
 
 def _heading(law):
     """In which direction a law leaves its start, in rad."""
-    headings = getattr(law, "headings", None)
-    if headings is not None:
-        return float(headings[0])
+    if hasattr(law, "headings"):
+        return float(law.headings[0])
     step = law.response()[1] - law.start
     return float(np.arctan2(step[1], step[0]))
 
@@ -105,51 +104,36 @@ def verdict_of(run):
     -------
     dict
     """
-    known = getattr(run, "verdict", None)
-    if known is None:
-        known = {"finished": run.finished, "reason": run.reason, "seconds": run.t[-1]}
-        known |= {
-            "least_clearance": _least(run),
-            "collisions": run.collisions,
-            "kidnapped": run.kidnapped,
-        }
-    return {name: value for name, value in known.items() if name != "notes"}
-
-
-def _least(run):
-    """The least clearance of a run in m, NaN if it is not known anywhere."""
-    known = run.clearance[np.isfinite(run.clearance)]
-    return known.min() if len(known) else np.nan
+    return {name: value for name, value in run.verdict.items() if name != "notes"}
 
 
 def _lines(run):
     """What came of a run, for people."""
     end = "finished" if run.finished else f"not finished: {run.reason}"
     touched = f"{run.collisions} contacts" if run.collisions else "touched nothing"
-    room = f"{touched}, least clearance {_least(run):.2f} m"
+    room = f"{touched}, least clearance {run.least_clearance:.2f} m"
     return (f"{end} after {run.t[-1]:.1f} s; {room}{_share(run)}{_stood(run)}",)
 
 
 def _share(run):
     """How much of the task a run was, for people."""
-    reached = getattr(run, "reached", None)
-    if reached is None or not len(reached):
-        return ""
-    way = f"; {run.done:.0%} of the way, {int(np.sum(reached))} of {len(reached)} subgoals"
+    way = f"; {run.done:.0%} of the way, {run.reached.sum()} of {len(run.reached)} subgoals"
     return f"{way}, at most {run.farthest:.2f} m from the response"
 
 
 def _stood(run):
     """Which waits a run kept, for people."""
-    waits = getattr(run, "waits", ())
-    return "".join(f"; stood {stood:.1f} s of {shown:.1f} s at subgoal {k:.0f}" for k, shown, stood in waits)
+    kept = [f"{stood:.1f} of {shown:.1f} s" for _, shown, stood in run.waits]
+    return f"; stood {', '.join(kept)}" if kept else ""
 
 
 def _next(run, options):
     """What to do with the task that was performed."""
     if not run.finished:
-        return command("show", options.out, "--map", options.map, "--out", _beside(options.out, "_shown.png"))
-    return command("export", options.task, "--to", "nav2", "--out", _beside(options.task, ".geojson"))
+        shown = _beside(options.out, "_shown.png")
+        return command("show", options.out, "--map", options.map, "--out", shown)
+    route = _beside(options.task, ".geojson")
+    return command("export", options.task, "--to", "nav2", "--out", route)
 
 
 def _beside(path, ending):

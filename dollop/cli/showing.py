@@ -80,14 +80,14 @@ def _log(path, options, background):
     scans, beams = log.ranges.shape
     seconds, returned = log.t[-1] - log.t[0], np.isfinite(log.ranges)
     walked = arc_length(log.poses[:, :2])[-1]
-    (x0, y0), (x1, y1) = log.poses[:, :2].min(axis=0), log.poses[:, :2].max(axis=0)
+    (x0, y0), (x1, y1) = log.poses[[0, -1], :2]
     rate = (scans - 1) / seconds if seconds else 0.0
     fov = np.degrees(log.angles[-1] - log.angles[0])
     lines = (
         f"{path}: a log of {scans} scans in {seconds:.1f} s, {rate:.1f} a second",
-        f"{beams} beams over {fov:.0f} degrees, up to {log.max_range:g} m, {returned.mean():.0%} of them return",
-        f"the laser moved {walked:.1f} m, within x {x0:.2f} to {x1:.2f} m, y {y0:.2f} to {y1:.2f} m",
-        f"time stamps from {log.t[0]!r} to {log.t[-1]!r} s".replace("np.float64(", "").replace(")", ""),
+        f"{beams} beams over {fov:.0f} degrees, {returned.mean():.0%} return within {log.max_range:g} m",
+        f"the laser moved {walked:.1f} m, from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m",
+        f"time stamps from {_stamp(log.t[0])} to {_stamp(log.t[-1])} s",
     )
     data = {"kind": "log", "scans": scans, "beams": beams, "seconds": seconds, "fov": fov}
     data |= {"max_range": log.max_range, "moved": walked, "begin": log.t[0], "end": log.t[-1]}
@@ -105,15 +105,10 @@ def _draw_log(ax, log, background):
         plot.grid_map(ax, background)
     every = max(1, np.isfinite(log.ranges).sum() // MOST_POINTS)
     rows, beams = np.nonzero(np.isfinite(log.ranges[::every]))
-    points = endpoints(log)[::every][rows, beams]
-    look = {
-        "s": 1.5,
-        "c": log.t[::every][rows] - log.t[0],
-        "cmap": "Blues",
-        "vmin": -0.4 * np.ptp(log.t),
-    }
-    drawn = ax.scatter(*points.T, **look, linewidths=0, label="readings")
+    points, since = endpoints(log)[::every][rows, beams], log.t[::every][rows] - log.t[0]
+    drawn = ax.scatter(*points.T, s=2, c=since, cmap=plot.LATER, vmin=0, linewidths=0)
     ax.figure.colorbar(drawn, ax=ax, label="time in the log [s]", shrink=0.6)
+    ax.plot([], [], "o", color=plot.USER, markersize=3, label="readings")
     plot.path(ax, log.poses, "way of the laser", plot.RUN, marker=".", markersize=3)
     plot.robot(ax, log.poses[0], label="laser at the beginning")
 
@@ -124,8 +119,8 @@ def _map(path, options, background):
     x, y = grid.origin
     lines = (
         f"{path}: a map of {columns} x {rows} cells of {side:g} m",
-        f"{columns * side:.1f} m x {rows * side:.1f} m, its lower left corner at ({x:.2f}, {y:.2f}) m",
-        f"{grid.free.mean():.0%} free, {grid.occupied.mean():.0%} occupied, {grid.unknown.mean():.0%} unknown",
+        f"{columns * side:.1f} m x {rows * side:.1f} m, from ({x:.2f}, {y:.2f}) m at the lower left",
+        f"{grid.free.mean():.0%} free, {grid.occupied.mean():.0%} occupied, the rest unknown",
         f"{grid.free.sum() * side**2:.1f} m^2 of free floor",
     )
     data = {
@@ -153,7 +148,7 @@ def _task(path, options, background):
     lines = (
         f"{path}: a task, shown {len(shown)} x{ways}",
         *as_lines(task),
-        f"from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m, as shown in {law.timed()[0][-1]:.1f} s",
+        f"from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m, in {law.timed()[0][-1]:.1f} s",
         f"{len(task.notes)} notes, {doubts} of them put it in doubt",
     )
     if options.map is None:
@@ -173,7 +168,7 @@ def _run(path, options, background):
         f"{path}: a run of {len(done.t)} periods, {done.t[-1]:.1f} s",
         "finished" if done.finished else f"not finished: {done.reason}",
         f"{done.collisions} contacts by the map, least clearance {least}",
-        f"kidnapped {len(done.kidnapped)} x; {1 - done.localised.mean():.0%} of the time not localised",
+        f"kidnapped {len(done.kidnapped)} x; localised {done.localised.mean():.0%} of the time",
     )
     data = {"kind": "run", **verdict_of(done)}
     return of_run(done, None, background), lines, (), data, command("perform", "--help")
@@ -186,12 +181,12 @@ def _scene(path, options, background):
     scene = Scene.load(path)
     walks = walks_of(scene)
     (x0, y0), (x1, y1) = np.min(scene.room.corners, axis=0), np.max(scene.room.corners, axis=0)
-    walked = f", the first of whom walks {arc_length(walks[0].positions)[-1]:.1f} m" if walks else ""
+    walked = f", the first walks {arc_length(walks[0].positions)[-1]:.1f} m" if walks else ""
     x, y, theta = scene.robot.pose
     lines = (
         f"{path}: a scene of the laboratory",
-        f"a room of {x1 - x0:.1f} m x {y1 - y0:.1f} m with {len(scene.room.furniture)} parts of furniture",
-        f"{len(scene.objects)} objects, {len(scene.moves)} of them moved meanwhile; {len(walks)} people{walked}",
+        f"a room of {x1 - x0:.1f} m x {y1 - y0:.1f} m, {len(scene.room.furniture)} parts of furniture",
+        f"{len(scene.objects)} objects, {len(scene.moves)} of them moved; {len(walks)} people{walked}",
         f"the robot watches from ({x:.2f}, {y:.2f}) m, {np.degrees(theta):.0f} degrees",
     )
     data = {"kind": "scene", "objects": len(scene.objects), "people": len(walks)}
@@ -208,7 +203,7 @@ def _table(path, options, background):
     columns = _columns(path)
     t = columns["t"]
     pairs = [(x[: -len("x")].rstrip("_"), x, y) for x, y in PAIRS if x in columns and y in columns]
-    walks = {name or "trajectory": np.column_stack([columns[x], columns[y]]) for name, x, y in pairs}
+    walks = {name or "trajectory": np.stack([columns[x], columns[y]], 1) for name, x, y in pairs}
     if "person" in columns:
         whole, who = walks["trajectory"], columns["person"]
         walks = {f"person {k:.0f}": whole[who == k] for k in np.unique(who)}
@@ -238,7 +233,7 @@ def _columns(path):
     lines = (line.decode("utf-8", "replace") for line in read_lines(path))
     names, *rows = csv.reader(line for line in lines if not line.startswith("#"))
     try:
-        numbers = [[_number(value) for value in row] for row in rows]
+        numbers = [list(map(_number, row)) for row in rows]
         return dict(zip(names, np.array(numbers, float).reshape(-1, len(names)).T, strict=True))
     except ValueError:
         raise FormatError(f"a row must have a number for each of {','.join(names)}", path) from None
@@ -246,7 +241,7 @@ def _columns(path):
 
 def _number(text):
     """A number or a truth value of a table."""
-    return {"True": 1.0, "False": 0.0, "": np.nan}.get(text) if text in ("True", "False", "") else float(text)
+    return float({"True": "1", "False": "0", "": "nan"}.get(text, text))
 
 
 def _draw_walks(ax, walks, background):
@@ -286,8 +281,9 @@ def _waypoints(path, options, background):
 
 def _path(path, options, background):
     columns = _columns(path)
-    nodes = zip(columns["x"], columns["y"], columns["wait"], columns["way"], strict=True)
-    return _route(path, [((x, y), {"wait": wait, "way": way}) for x, y, wait, way in nodes], background)
+    rows = zip(columns["x"], columns["y"], columns["wait"], columns["way"], strict=True)
+    nodes = [((x, y), {"wait": wait, "way": way}) for x, y, wait, way in rows]
+    return _route(path, nodes, background)
 
 
 def _route(path, nodes, background):
@@ -323,5 +319,7 @@ def _draw_route(ax, parts, background):
         plot.grid_map(ax, background)
     for k, (name, places) in enumerate(parts.items()):
         look = {"linestyle": "--"} if k else {}
-        plot.path(ax, places, name, plot.LAW, marker=".", markersize=5, markerfacecolor="black", **look)
-        ax.plot(*places[0], "o", color=plot.LAW, markeredgecolor="black", label=None if k else "begin")
+        look |= {"marker": ".", "markersize": 5, "markerfacecolor": "black"}
+        plot.path(ax, places, name, plot.LAW, **look)
+        label = None if k else "begin"
+        ax.plot(*places[0], "o", color=plot.LAW, markeredgecolor="black", label=label)

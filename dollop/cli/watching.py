@@ -18,7 +18,7 @@ LOGS, MAPS = (CARMEN_LOG, BAG), (CARMEN_MAP, ROS_MAP, BAG)
 
 
 def check_kind(word, path, kinds, other=None):
-    """Refuse a file that is known to hold something else; what none of the known is its reader refuses.
+    """Refuse a file that is known to hold something else.
 
     Parameters
     ----------

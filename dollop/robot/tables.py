@@ -43,9 +43,9 @@ def save_run(path, run):
     """
     events = [BETWEEN.join(each) for each in events_of(run)]
     columns = run.t, *run.poses.T, *run.true_poses.T
-    numbers = [[_written(value) for value in column.tolist()] for column in columns]
+    numbers = [list(map(_written, column.tolist())) for column in columns]
     counts = [column.tolist() for column in (run.way, run.active, run.localised.astype(int))]
-    clearance = [_written(value) for value in run.clearance.tolist()]
+    clearance = map(_written, run.clearance.tolist())
     with whole_file(path, "w", RUN) as stream:
         table = csv.writer(stream, lineterminator="\n")
         table.writerow(COLUMNS)
@@ -70,9 +70,7 @@ def events_of(run):
         See the top of `dollop.robot.tables`.
     """
     events = [[] for _ in run.t]
-    radius = getattr(run, "radius", None)
-    if radius is not None:
-        events[0].append(f"radius {radius:g} m")
+    events[0].append(f"radius {run.radius:g} m")
     for k in rows_kidnapped(run).tolist():
         events[k].append("kidnapped")
     for k in np.flatnonzero(np.diff(run.active) | np.diff(run.way)) + 1:
@@ -84,6 +82,8 @@ def events_of(run):
         events[k].append(f"waits {seconds:.1f} s")
     for k in _begins(run.clearance < 0):
         events[k].append("touches")
+    if run.finished:
+        events[-1].append(f"subgoal {run.active[-1] + 1}")
     events[-1].append(FINISHED if run.finished else run.reason.replace(BETWEEN, ", "))
     return events
 
@@ -106,7 +106,7 @@ def _waits(run):
     """When a run began to stand where the task waits, the row, and for how long in s."""
     moves = np.hypot(*np.diff(run.poses[:, :2], axis=0).T)
     begins = _begins(np.append(moves, np.inf) < STILL)
-    for k, _, stood in getattr(run, "waits", ()):
+    for k, _, stood in run.waits:
         reached = np.flatnonzero(run.active >= k)
         if stood > 0 and len(begins) and len(reached):
             yield begins[np.abs(begins - reached[0]).argmin()], stood
@@ -170,7 +170,7 @@ def _as_run(values, events):
         "kidnapped": np.array(kidnapped),
         "way": values[:, 7],
     }
-    if radius and "radius" in Run.__dataclass_fields__:
+    if radius:
         known["radius"] = float(radius[1])
     return Run(
         t,
