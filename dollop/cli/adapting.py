@@ -6,10 +6,9 @@ import dollop
 from dollop.cli.learning import as_data, as_lines, performing
 from dollop.cli.picturing import write_task
 from dollop.cli.telling import Result, busy, outputs_of, tell, tell_notes
-from dollop.cli.watching import check_kind, load_map, read_log, watched
+from dollop.cli.watching import check_kind, load_map, map_files, read_log, watched
 from dollop.formats.kinds import PNG, TASK
 from dollop.formats.writing import Output, check_outputs
-from dollop.gridmap import map_inputs
 
 __all__ = ["run"]
 
@@ -31,7 +30,7 @@ def run(options):
         If it is not sure of any object which it is, or a place follows nothing that is left.
     """
     out, picture = outputs_of(options, ".json", "a task")
-    read = [options.log, *map_inputs(options.map)]
+    read = [options.log, *map_files(options.map, "LOG", options.log)]
     check_outputs([Output(out, TASK), Output(picture, PNG)], read)
     check_kind("TASK", options.task, [TASK], ("LOG", options.log))
     task = dollop.Task.load(options.task)

@@ -5,10 +5,9 @@ import numpy as np
 import dollop
 from dollop.cli.picturing import write_task
 from dollop.cli.telling import Result, busy, command, outputs_of, tell, tell_notes
-from dollop.cli.watching import load_map, read_log, tell_people, watched
+from dollop.cli.watching import load_map, map_files, read_log, tell_people, watched
 from dollop.formats.kinds import PNG, TASK
 from dollop.formats.writing import Output, check_outputs
-from dollop.gridmap import map_inputs
 from dollop.trajectory import arc_length
 
 __all__ = ["as_data", "as_lines", "performing", "run"]
@@ -28,7 +27,7 @@ def run(options):
         If nobody walks in one of the logs, or there is another number of users than of logs.
     """
     out, picture = outputs_of(options, ".json", "a task")
-    read = [*options.logs, *map_inputs(options.map)]
+    read = [*options.logs, *map_files(options.map, "LOG", options.logs[0])]
     check_outputs([Output(out, TASK), Output(picture, PNG)], read)
     users = _users(options)
     background = load_map(options.map, options.logs[0])

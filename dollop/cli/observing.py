@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from dollop.cli.telling import Result, command, outputs_of, tell, tell_notes
-from dollop.cli.watching import load_map, read_log, tell_people, watched
+from dollop.cli.watching import load_map, map_files, read_log, tell_people, watched
 from dollop.formats.kinds import EVERYBODY, PNG, TRAJECTORY
 from dollop.formats.writing import Output, check_outputs, together, whole_file
-from dollop.gridmap import map_inputs
 from dollop.trajectory import arc_length
 
 __all__ = ["run", "said"]
@@ -54,7 +53,7 @@ def _outputs(options):
         raise ValueError(f"--tracks must be named .csv, and not as --out, got {options.tracks}")
     outputs = [Output(out, TRAJECTORY), Output(picture, PNG)]
     outputs += [Output(path, EVERYBODY) for path in tracks]
-    check_outputs(outputs, [options.log, *map_inputs(options.map)])
+    check_outputs(outputs, [options.log, *map_files(options.map, "LOG", options.log)])
     return out, picture
 
 

@@ -9,10 +9,9 @@ from dollop.checks import checked_number, checked_whole
 from dollop.cli.kidnapping import draw_kidnappings
 from dollop.cli.picturing import of_run, write_picture
 from dollop.cli.telling import Result, busy, command, named, outputs_of, tell
-from dollop.cli.watching import check_kind, load_map
+from dollop.cli.watching import check_kind, load_map, map_files
 from dollop.formats.kinds import GIF, PNG, RUN, TASK
 from dollop.formats.writing import Output, check_outputs, together
-from dollop.gridmap import map_inputs
 from dollop.robot.tables import save_run
 
 __all__ = ["run", "verdict_of"]
@@ -64,7 +63,7 @@ def _outputs(options):
     outputs = [Output(out, RUN), Output(picture, PNG)]
     film = None if options.film is None else named(options.film, ".gif", "--film", "a film")
     outputs += [] if film is None else [Output(film, GIF)]
-    check_outputs(outputs, [options.task, *map_inputs(options.map)])
+    check_outputs(outputs, [options.task, *map_files(options.map, "TASK", options.task)])
     return out, picture, film
 
 
@@ -110,7 +109,7 @@ def verdict_of(run):
 def _lines(run):
     """What came of a run, for people."""
     end = "finished" if run.finished else f"not finished: {run.reason}"
-    touched = f"{run.collisions} contacts" if run.collisions else "touched nothing"
+    touched = f"touched something {run.collisions} x" if run.collisions else "touched nothing"
     room = f"{touched}, least clearance {run.least_clearance:.2f} m"
     return (f"{end} after {run.t[-1]:.1f} s; {room}{_share(run)}{_stood(run)}",)
 

@@ -10,11 +10,10 @@ from dollop.cli.learning import as_data, as_lines
 from dollop.cli.performing import verdict_of
 from dollop.cli.picturing import of_run, of_task, write_picture
 from dollop.cli.telling import Result, busy, command, named, tell
-from dollop.cli.watching import check_kind, load_map
+from dollop.cli.watching import check_kind, load_map, map_files
 from dollop.formats import kinds
 from dollop.formats.files import FormatError, read_json, read_lines
 from dollop.formats.writing import Output, check_outputs
-from dollop.gridmap import map_inputs
 from dollop.trajectory import arc_length
 
 __all__ = ["run"]
@@ -40,7 +39,7 @@ def run(options):
         For a file that holds nothing that is known, or a picture.
     """
     out = named(options.out, ".png", holds="a picture")
-    maps = [] if options.map is None else map_inputs(options.map)
+    maps = [] if options.map is None else map_files(options.map, "FILE", options.file)
     check_outputs([Output(out, kinds.PNG)], [options.file, *maps])
     shown = _shower(options.file)
     background = None if options.map is None else load_map(options.map)

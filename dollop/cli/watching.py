@@ -8,10 +8,11 @@ from pathlib import Path
 import dollop
 from dollop.cli.telling import busy
 from dollop.formats.kinds import BAG, CARMEN_LOG, CARMEN_MAP, ROS_MAP, kind_of
+from dollop.gridmap import map_inputs
 from dollop.people import moving_speed
 from dollop.trajectory import arc_length
 
-__all__ = ["check_kind", "load_map", "read_log", "tell_people", "watched"]
+__all__ = ["check_kind", "load_map", "map_files", "read_log", "tell_people", "watched"]
 
 LOGS, MAPS = (CARMEN_LOG, BAG), (CARMEN_MAP, ROS_MAP, BAG)
 """Kinds of files that hold laser scans, and maps; a bag can hold both."""
@@ -93,6 +94,29 @@ def load_map(path, log=None):
     """
     check_kind("MAP", path, MAPS, None if log is None else ("LOG", log))
     return dollop.OccupancyGrid.load(path)
+
+
+def map_files(path, word, other):
+    """Files that `load_map` reads of a map, if it is none of another kind.
+
+    Parameters
+    ----------
+    path : str
+    word, other : str
+        What the file is called, and which it is, that it may have been mistaken for.
+
+    Returns
+    -------
+    list of str or Path
+
+    Raises
+    ------
+    ValueError
+        If it is no map, as far as that can be told before it is read.
+    """
+    if os.path.exists(path):
+        check_kind("MAP", path, MAPS, (word, other))
+    return map_inputs(path)
 
 
 def watched(log, background, user="fastest", min_area=0.01, what="observing"):
