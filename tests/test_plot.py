@@ -237,7 +237,7 @@ def test_a_run_shows_what_it_reached_and_where_it_was_carried(ax):
     task = learned([0.0, 2.0, 0.0, 0.0])
     background = room_map()
     robot = Unicycle((*task.law.start, 0.0), radius=0.3)
-    done = perform(task, robot, kidnap=[(2.0, (3.0, 3.0, 0.0))], timeout=9.0)
+    done = perform(task, robot, kidnap=[(2.0, (3.0, 3.0, 0.0))], timeout=20.0)
     plot.grid_map(ax, background)
     plot.run(ax, done, task)
     crosses = {line.get_label(): line.get_xydata() for line in ax.lines if line.get_label().startswith("subgoals")}

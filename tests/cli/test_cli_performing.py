@@ -177,3 +177,24 @@ def test_a_task_of_moved_objects_is_performed_as_it_is(room, capsys):
     call(capsys, "adapt", "task.json", DATA / "moved_cans_1.log.gz", "--map", "lab.yaml", "--out", "task.json")
     said = call(capsys, *PERFORM)
     assert said.status == 0 and "touched nothing" in said.out
+
+
+@pytest.mark.parametrize(("to", "suffix"), [("nav2", ".geojson"), ("waypoints", ".yaml"), ("csv", ".csv")])
+def test_a_task_is_exported_and_shown(to, suffix, room, capsys):
+    """Within a centimetre of the law; the last line shows what was written, which is its way."""
+    pytest.importorskip("dollop.route")
+    said = call(capsys, "export", "task.json", "--to", to, "--out", f"route{suffix}")
+    assert said.status == 0 and "mm from the way of the law" in said.out
+    told = json.loads(call(capsys, "export", "task.json", "--to", to, "--out", f"route{suffix}", "--json").out)
+    assert told["deviation"] <= 0.01 and told["written"] == [f"route{suffix}"]
+    shown = call(capsys, *said.next)
+    assert shown.status == 0 and "17.1 m long" in shown.out
+
+
+def test_an_unknown_target_lists_the_known_ones(room, capsys):
+    """In one line; and a file that is named otherwise is refused too."""
+    pytest.importorskip("dollop.route")
+    said = call(capsys, "export", "task.json", "--to", "moveit", "--out", "route.json")
+    assert said.status == 1 and all(each in said.err for each in ("nav2", "waypoints", "csv", "moveit"))
+    said = call(capsys, "export", "task.json", "--to", "nav2", "--out", "route.txt")
+    assert said.status == 1 and ".geojson" in said.err and not Path("route.txt").exists()
