@@ -10,8 +10,9 @@ from typing import NamedTuple
 from dollop.checks import shortened
 
 __all__ = [
-    "BAG", "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "GIF", "PGM", "PNG", "ROS_MAP", "RUN", "SCENE", "TASK",
-    "TRAJECTORY", "TRUTH", "Kind", "check_no_map_names", "check_replaceable", "kind_of",
+    "BAG", "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "GIF", "PATH_TABLE", "PGM", "PNG", "ROS_MAP", "ROUTE_GRAPH",
+    "RUN", "SCENE", "TASK", "TRAJECTORY", "TRUTH", "WAYPOINTS", "Kind", "check_no_map_names", "check_replaceable",
+    "kind_of",
 ]  # fmt: skip
 
 HEAD = 1 << 16
@@ -50,10 +51,15 @@ EVERYBODY = Kind("a table of everybody's trajectories", rb"\At,x,y,occluded,pers
 TRUTH = Kind("the truth of a recording", _TRUTH)
 GIF = Kind("a film", rb"\AGIF8[79]a")
 RUN = Kind("a run", rb"\At,x,y,theta,true_x,true_y,true_theta,way,segment,localised,clearance,event\r?\n")
+_GRAPH = rb'\A\s*\{\s*"type": "FeatureCollection",\s*"name": "dollop route"'
+ROUTE_GRAPH = Kind("a route graph", _GRAPH)
+WAYPOINTS = Kind("waypoints", rb"\A# Dollop route: waypoints")
+PATH_TABLE = Kind("a path", rb"\A# Dollop route: way, t, x")
 BAG = Kind("a ROS bag", rb"\A(?:#ROSBAG|\x89MCAP|SQLite format 3)")
 
 _KNOWN = (
-    CARMEN_LOG, CARMEN_MAP, PGM, PNG, GIF, TASK, SCENE, TRAJECTORY, EVERYBODY, TRUTH, RUN, BAG, ROS_MAP,
+    CARMEN_LOG, CARMEN_MAP, PGM, PNG, GIF, TASK, SCENE, TRAJECTORY, EVERYBODY, TRUTH, RUN, ROUTE_GRAPH, WAYPOINTS,
+    PATH_TABLE, BAG, ROS_MAP,
 )  # fmt: skip
 
 
