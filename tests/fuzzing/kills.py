@@ -131,7 +131,7 @@ def seen(version):
 
 def quickly_observes(folder, version):
     """The same, with what was found before, and a picture that takes no time to draw."""
-    from dollop import cli
+    from dollop.cli import observing
 
     dollop.observe = lambda *_, **__: seen(version)
 
@@ -139,7 +139,7 @@ def quickly_observes(folder, version):
         with whole_file(path, kind=PNG) as stream:
             stream.write(b"\x89PNG\r\n\x1a\n%d" % version)
 
-    cli._draw_observation = draw
+    observing._draw_observation = draw
     observes(folder, version)
 
 
