@@ -21,6 +21,7 @@ from dollop.law.timing import (
     CORNER,
     SOONEST,
     Stands,
+    on_cuts,
     shown_pauses,
     shown_profile,
     times_along,
@@ -38,6 +39,7 @@ from dollop.segmentation import (
 from dollop.trajectory import (
     align,
     arc_length,
+    at_arc_length,
     check_one_way,
     check_trajectories,
     check_trajectory,
@@ -192,15 +194,47 @@ class SequencedLDS:
         (1, array([[0., 1.]]))
         """
         given = tolerance, n_segments, sample_period, candidates
+        _, _, period, _ = checked_search(*given)
+        stands = [Stands.of(walk, period) for walk in check_trajectories(trajectories)]
+        return cls.fit_stands(stands, tolerance, n_segments, retimed, sample_period, candidates)
+
+    @classmethod
+    def fit_stands(
+        cls,
+        stands,
+        tolerance=0.02,
+        n_segments=None,
+        retimed=True,
+        sample_period=0.1,
+        candidates=100,
+    ):
+        """The same, for walks of which it is known where somebody stood (beyond the paper).
+
+        Parameters
+        ----------
+        stands : sequence of Stands
+            Of each walk.
+        tolerance, n_segments, retimed, sample_period, candidates
+            As for `fit`.
+
+        Returns
+        -------
+        SequencedLDS
+
+        Raises
+        ------
+        ValueError
+            As `fit`.
+        """
+        given = tolerance, n_segments, sample_period, candidates
         tolerance, n_segments, sample_period, candidates = checked_search(*given)
         retimed = checked_flag("retimed", retimed)
-        stands = [Stands.of(walk, sample_period) for walk in check_trajectories(trajectories)]
         walks = [each.walk for each in stands]
         aligned, shares = align(walks, 2 * candidates - 1)
         check_one_way(walks, aligned)
+        pauses, aligned, shares = cut_at_pauses(stands, aligned, shares)
         path, moments = aligned.mean(axis=0)[::2], cut_moments(walks, shares[:, ::2])
         statistics = retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
-        pauses = shown_pauses(stands, shares[:, ::2], arc_length(path)[-1])
         division = Division(path, statistics, pauses)
         cuts = division.exactly(n_segments) if n_segments is not None else division.within(tolerance)
         at = moments[:, cuts]
@@ -667,6 +701,22 @@ class Division:
         turns = turns_at(whole, np.cumsum([line.way[-1] for line in lines]))
         turned = np.where(corners, 0, turns - self.turns(cuts)) / TURNED
         return np.maximum(np.where(total > 1, each, np.minimum(each, 1)), turned)
+
+
+def cut_at_pauses(stands, aligned, shares):
+    """Seconds stood by candidate cut, and aligned walks (K, 2 C - 1, 2) and shares (K, 2 C - 1) with cuts there.
+
+    As they are where nobody pauses on the way.
+    """
+    length, count = arc_length(aligned.mean(axis=0)[::2])[-1], aligned.shape[1] // 2 + 1
+    seconds, moved = on_cuts(shown_pauses(stands, shares[:, ::2], length), count, length)
+    if (moved == np.arange(count)).all():
+        return seconds, aligned, shares
+    fine = np.arange(2 * count - 1)
+    moved = 2 * np.interp(fine / 2, np.arange(count), moved)
+    shares = np.stack([np.interp(moved, fine, share) for share in shares])
+    pairs = zip((each.walk for each in stands), shares, strict=True)
+    return seconds, np.stack([at_arc_length(walk, share * arc_length(walk)[-1]) for walk, share in pairs]), shares
 
 
 def cut_moments(walks, shares):

@@ -1,21 +1,42 @@
 """When a demonstrator was where: pauses, and the speed along each segment (beyond the paper)."""
 
 from dataclasses import dataclass
+from math import fsum
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.ndimage import correlate1d, maximum_filter1d, uniform_filter1d
 
 from dollop.trajectory import arc_length, at_arc_length
 
-__all__ = ["CORNER", "PARTS", "SOONEST", "Stands", "shown_pauses", "shown_profile", "times_along", "turns_at"]
+__all__ = [
+    "CORNER",
+    "PARTS",
+    "SOONEST",
+    "Stands",
+    "apart_within",
+    "on_cuts",
+    "pooled",
+    "shown_pauses",
+    "shown_profile",
+    "times_along",
+    "turns_at",
+]
 
 STILL, LEAST = 0.05, 1.0
 """Who stays within so many metres of a place for so many seconds stands there."""
 SLOW = 0.25
 """Nobody stands who is faster than this share of the walk's own mean speed: a path without times, of
 which no sample period is known, is not taken for a pause."""
-APART = 0.5
-"""Way in m over which stands of several walks are one pause."""
+QUIET, NOISY = 0.01, 0.03
+"""m: scatter of the samples along each axis that is small beside `STILL`, and the most that is allowed for:
+a laser's track of somebody who stands scatters by 0.5 cm, and by some centimetres where it is seen badly."""
+CREEP = 1e-3
+"""m: two samples of a place are no nearer to each other."""
+ROUNDS = 3
+"""How often a middle is sought anew: then it hardly moves any more."""
+APART, SHARE = 0.5, 0.1
+"""Way in m, and share of a shorter walk, over which stands are one pause, and within which of an end of a
+walk they are at that end: a step is longer."""
 PARTS = 16
 """Parts of a segment, each of which has its speed: a person speeds up within a metre, and a segment
 is about three metres long."""
@@ -45,7 +66,7 @@ class Stands:
     seconds: np.ndarray
 
     @classmethod
-    def of(cls, walk, period):
+    def of(cls, walk, period, which="all"):
         """Take the pauses out of a walk.
 
         Parameters
@@ -54,6 +75,9 @@ class Stands:
             m.
         period : float
             Time between samples in s.
+        which : {"all", "inner", "ends"}
+            All; or those that are half a metre of the way and more from both its ends, or a tenth of
+            a shorter one; or only the others.
 
         Returns
         -------
@@ -69,22 +93,99 @@ class Stands:
         >>> stands.seconds.round(6), stands.walk[stands.rows]
         (array([2.1]), array([[1., 0.]]))
         """
-        spans = [_narrowed(walk, *span) for span in _still(walk, period)]
-        spans = [(a, b) for a, b in spans if (b - a) * period >= LEAST]
+        spans = _spans(walk, period)
+        found, _ = cls._without(walk, spans, period)
+        if which == "all" or not len(found.rows):
+            return found
+        inner = found.inner
+        chosen = inner if which == "inner" else ~inner
+        return cls._without(walk, [span for span, of in zip(spans, chosen, strict=True) if of], period)[0]
+
+    @classmethod
+    def known(cls, walk, period, rows, seconds):
+        """A walk of which it is known where somebody stood, but for its ends.
+
+        Parameters
+        ----------
+        walk : (N, 2) float array
+            m; without the pauses that are known.
+        period : float
+            Time between samples in s.
+        rows : (P,) int array
+            At which samples they were, in order.
+        seconds : (P,) float array
+            How long each lasted.
+
+        Returns
+        -------
+        Stands
+            Of those, and of the stands that the walk has at its ends.
+        """
+        spans = _spans(walk, period)
+        inner = cls._without(walk, spans, period)[0].inner
+        spans = [span for span, of in zip(spans, inner, strict=False) if not of]
+        ends, number = cls._without(walk, spans, period)
+        rows = np.concatenate([ends.rows, number[np.asarray(rows, int)]])
+        order = np.argsort(rows, kind="stable")
+        return cls(ends.walk, rows[order], np.concatenate([ends.seconds, seconds])[order])
+
+    @property
+    def inner(self):
+        """(P,) bool array: which of them are not at an end of the walk (see `apart_within`)."""
+        way = arc_length(self.walk)
+        at, apart = way[self.rows], apart_within(way[-1])
+        return (at > apart) & (at < way[-1] - apart)
+
+    @classmethod
+    def _without(cls, walk, spans, period):
+        """The walk without spans (first, last), and at which of its samples each of the walk's is then."""
         kept = np.ones(len(walk), bool)
         places = walk.copy()
         for first, last in spans:
             places[first] = walk[first : last + 1].mean(axis=0)
             kept[first + 1 : last + 1] = False
-        if kept.sum() < 3 or not (places[kept] != places[kept][0]).any():
-            return cls(walk, np.zeros(0, int), np.zeros(0))
-        rows = np.cumsum(kept)[[first for first, _ in spans]] - 1
-        return cls(places[kept], rows, period * np.array([b - a for a, b in spans], float))
+        if not spans or kept.sum() < 3 or not (places[kept] != places[kept][0]).any():
+            return cls(walk, np.zeros(0, int), np.zeros(0)), np.arange(len(walk))
+        number = np.cumsum(kept) - 1
+        rows = number[[first for first, _ in spans]]
+        return cls(places[kept], rows, period * np.array([b - a for a, b in spans], float)), number
+
+
+def apart_within(length):
+    """How much of a way is one place where somebody stands.
+
+    Parameters
+    ----------
+    length : float
+        Of the way, m.
+
+    Returns
+    -------
+    float
+        m.
+
+    Examples
+    --------
+    >>> apart_within(12.0), apart_within(1.0)
+    (0.5, 0.1)
+    """
+    return min(APART, SHARE * length)
+
+
+def _spans(walk, period):
+    """Spans (first, last) of samples in which somebody stands."""
+    spans = [_narrowed(walk, *span, _width(period)) for span in _still(walk, period)]
+    return [(a, b) for a, b in spans if (b - a) * period >= LEAST]
+
+
+def _width(period):
+    """Samples that last as long as the shortest stand, at least."""
+    return int(np.ceil(LEAST / period - 1e-9)) + 1
 
 
 def _still(walk, period):
     """Spans (first, last) of samples that all belong to some window in which the walk stands."""
-    width = int(min(np.ceil(LEAST / period - 1e-9), len(walk))) + 1
+    width = min(_width(period), len(walk) + 1)
     speed = arc_length(walk)[-1] / (len(walk) * period)
     radius = min(STILL, SLOW * speed * LEAST)
     if width > len(walk):
@@ -92,7 +193,11 @@ def _still(walk, period):
     # Who walks 2 r evenly scatters by r / sqrt(3) about the middle, whichever way he walks.
     centred = walk - walk.mean(axis=0)
     first, second = (uniform_filter1d(each, width, axis=0) for each in (centred, centred**2))
-    middle = (second - first**2).sum(axis=1) <= radius**2 / 3
+    middle = (second - first**2).sum(axis=1) <= radius**2 / 3 + 2 * _noise(walk)
+    # Noise hides a slow step, but not where the window leads to.
+    steps = np.arange(width) - (width - 1) / 2
+    slope = correlate1d(centred, steps / (steps**2).sum(), axis=0)
+    middle &= np.hypot(*slope.T) <= 2 * radius / LEAST * period
     middle[: width // 2] = middle[len(walk) - (width - 1) // 2 :] = False  # no whole window
     origin = -1 if width % 2 == 0 else 0
     still = maximum_filter1d(middle.astype(np.int8), width, mode="constant", origin=origin)
@@ -100,14 +205,43 @@ def _still(walk, period):
     return list(zip(edges[::2], edges[1::2] - 1, strict=True))
 
 
-def _narrowed(walk, first, last):
-    """The span without the steps before and behind: within the radius of the place itself."""
+def _noise(walk):
+    """Variance in m^2 along each axis of what the samples of a walk scatter, beyond what is small.
+
+    Noise of standard deviation s has second differences of median length sqrt(6 ln 4) s.
+    """
+    bends = np.hypot(*np.diff(walk, 2, axis=0).T)
+    scatter = min(np.median(bends) / np.sqrt(6 * np.log(4)), NOISY) if len(bends) else 0.0
+    return max(scatter**2 - QUIET**2, 0.0)
+
+
+def _narrowed(walk, first, last, width):
+    """The span without the steps before and behind: within the scatter of the place itself.
+
+    Of Gaussian scatter 94 % lie within twice the median distance. At the ends of a walk, where a
+    stand has no length of its own, it is all that is within the radius.
+    """
     samples = walk[first : last + 1]
-    near = np.flatnonzero(np.hypot(*(samples - samples.mean(axis=0)).T) <= STILL)
-    return (first + near[0], first + near[-1]) if len(near) else (first, first)
+    if first == 0 or last == len(walk) - 1:
+        near = np.flatnonzero(np.hypot(*(samples - samples.mean(axis=0)).T) <= STILL)
+        return (first + near[0], first + near[-1]) if len(near) else (first, first)
+    away = np.hypot(*(samples - uniform_filter1d(samples, width, axis=0)).T)
+    reach = np.clip(2 * np.median(away), CREEP, STILL)
+    begin, end = _middle(samples[: 2 * width]), _middle(samples[-2 * width :])
+    at_begin, at_end = (np.flatnonzero(np.hypot(*(samples - place).T) <= reach) for place in (begin, end))
+    return (first + at_begin[0], first + at_end[-1]) if len(at_begin) and len(at_end) else (first, first)
 
 
-def shown_pauses(stands, shares, count):
+def _middle(samples):
+    """Where most of some samples (N, 2) are: the mean of those that are not farther than half of them."""
+    middle = samples.mean(axis=0)
+    for _ in range(ROUNDS):
+        away = np.hypot(*(samples - middle).T)
+        middle = samples[away <= np.median(away)].mean(axis=0)
+    return middle
+
+
+def shown_pauses(stands, shares, length):
     """Where and how long the walks stood, pooled.
 
     Parameters
@@ -115,24 +249,53 @@ def shown_pauses(stands, shares, count):
     stands : sequence of K Stands
     shares : (K, C) float array
         Shares of each walk's way, rising from 0 to 1, at which it may be cut (see `align`).
-    count : float
+    length : float
         The mean length of the walks, m.
 
     Returns
     -------
-    dict of int to float
-        For a candidate cut the mean pause in s, where at least half of the walks stood.
+    list of (float, float)
+        At which candidate cut, as a fractional number, and the mean pause in s, where at least half
+        of the walks stood.
     """
     found = []
     for k, each in enumerate(stands):
         way = arc_length(each.walk)
         at = np.interp(way[each.rows] / way[-1], shares[k], np.arange(shares.shape[1]))
-        found += zip(at, each.seconds, [k] * len(at), strict=True)
-    pauses, apart = {}, max(APART / count * (shares.shape[1] - 1), 2.0)
+        found += zip(at.tolist(), each.seconds.tolist(), [k] * len(at), strict=True)
+    apart = max(apart_within(length) / length * (shares.shape[1] - 1), 2.0)
+    return pooled(found, lambda at: len(stands), apart)
+
+
+def pooled(found, count, apart):
+    """The pauses that walks have in common, each as long as on the mean of all walks.
+
+    Parameters
+    ----------
+    found : list of (float, float, int)
+        Where along the way, how long in s, and in which walk somebody stood.
+    count : callable
+        How many walks there are at a place.
+    apart : float
+        How far apart along the way stands of several walks, or of one, are one pause.
+
+    Returns
+    -------
+    list of (float, float)
+        Where and how long, in order, where at least half of the walks stood; who did not counts as
+        0 s.
+
+    Examples
+    --------
+    >>> pooled([(3.0, 2.0, 0), (7.0, 9.0, 0), (3.2, 4.0, 1)], lambda at: 3, 0.5)
+    [(3.1, 2.0)]
+    """
+    pauses = []
     for group in _grouped(sorted(found), apart):
-        at, seconds, walks = map(np.array, zip(*group, strict=True))
-        if len(set(walks)) >= len(stands) / 2:
-            pauses[round(at.mean())] = float(seconds.sum() / len(stands))
+        at, seconds, walks = zip(*group, strict=True)
+        middle = fsum(at) / len(at)
+        if len(set(walks)) >= count(middle) / 2:
+            pauses.append((middle, fsum(seconds) / max(count(middle), len(set(walks)))))
     return pauses
 
 
@@ -145,6 +308,53 @@ def _grouped(found, apart):
         else:
             groups.append([each])
     return groups
+
+
+def on_cuts(pauses, count, length):
+    """Cuts for pauses, and where the candidates must be moved to for it.
+
+    A pause that is not at an end has a cut of its own, and two candidates at least on either side of
+    it, of which a segment consists.
+
+    Parameters
+    ----------
+    pauses : sequence of (float, float)
+        At which candidate, as a fractional number, and how long in s; in order.
+    count : int
+        How many candidates there are at equal distances, C.
+    length : float
+        Of the way, m.
+
+    Returns
+    -------
+    seconds : dict of int to float
+        By candidate.
+    moved : (C,) float array
+        Where each candidate is to be instead, evenly between the pauses.
+
+    Examples
+    --------
+    >>> seconds, moved = on_cuts([(4.4, 3.0)], 9, 4.0)
+    >>> seconds, moved
+    ({4: 3.0}, array([0. , 1.1, 2.2, 3.3, 4.4, 5.3, 6.2, 7.1, 8. ]))
+    """
+    last = count - 1
+    apart = apart_within(length) / length * last
+    inner = [each for each in pauses if apart < each[0] < last - apart]
+    room = 2 * np.arange(1, len(inner) + 1)
+    at = np.array([where for where, _ in inner])
+    cuts = np.maximum.accumulate(np.maximum(np.rint(at), 2) - room) + room
+    cuts = np.minimum(cuts, last - room[::-1]).astype(int)
+    if len(cuts) and cuts.min() < 2:  # more pauses than there is room for
+        cuts = np.rint(at).astype(int)
+        moved = np.arange(count, dtype=float)
+    else:
+        moved = np.interp(np.arange(count), [0, *cuts, last], [0, *at, last])
+    ends = [(0 if where <= apart else last, each) for where, each in pauses if (where, each) not in inner]
+    seconds = {}
+    for cut, each in [*ends, *((cut, each) for cut, (_, each) in zip(cuts.tolist(), inner, strict=True))]:
+        seconds[cut] = seconds.get(cut, 0.0) + each
+    return seconds, moved
 
 
 def turns_at(path, ways):
