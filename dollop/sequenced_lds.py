@@ -267,6 +267,30 @@ class SequencedLDS:
         profile = shown_profile(walks, moments, np.array(lengths), sample_period)
         return replace(self, pauses=pauses, corners=corners, profile=profile)
 
+    def without_waits_at_ends(self):
+        """The same law, for a task: what was waited before the first step and after the last is none of it.
+
+        A recording begins before the walk and ends after it, by whoever makes it; how long somebody
+        stands there says nothing of the task.
+
+        Returns
+        -------
+        SequencedLDS
+            Without pauses at start and last subgoal.
+
+        Examples
+        --------
+        >>> x = np.concatenate([np.zeros(30), np.arange(0, 3, 0.1)])
+        >>> law = SequencedLDS.fit(np.column_stack([x, 0 * x]))
+        >>> law.pauses.round(6), law.without_waits_at_ends().pauses
+        (array([3., 0.]), array([0., 0.]))
+        """
+        if self.pauses is None:
+            return self
+        pauses = self.pauses.copy()
+        pauses[[0, -1]] = 0.0
+        return replace(self, pauses=pauses)
+
     def lines(self, reach=0.01):
         """What each segment keeps to: the response of its LDS from the subgoal before.
 

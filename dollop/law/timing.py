@@ -59,11 +59,14 @@ class Stands:
         Which samples.
     seconds : (P,) float array
         How long each lasted.
+    number : (M,) int array
+        For each sample with the pauses which one it is without.
     """
 
     walk: np.ndarray
     rows: np.ndarray
     seconds: np.ndarray
+    number: np.ndarray
 
     @classmethod
     def of(cls, walk, period, which="all"):
@@ -94,12 +97,12 @@ class Stands:
         (array([2.1]), array([[1., 0.]]))
         """
         spans = _spans(walk, period)
-        found, _ = cls._without(walk, spans, period)
+        found = cls._without(walk, spans, period)
         if which == "all" or not len(found.rows):
             return found
         inner = found.inner
         chosen = inner if which == "inner" else ~inner
-        return cls._without(walk, [span for span, of in zip(spans, chosen, strict=True) if of], period)[0]
+        return cls._without(walk, [span for span, of in zip(spans, chosen, strict=True) if of], period)
 
     @classmethod
     def known(cls, walk, period, rows, seconds):
@@ -122,12 +125,26 @@ class Stands:
             Of those, and of the stands that the walk has at its ends.
         """
         spans = _spans(walk, period)
-        inner = cls._without(walk, spans, period)[0].inner
+        inner = cls._without(walk, spans, period).inner
         spans = [span for span, of in zip(spans, inner, strict=False) if not of]
-        ends, number = cls._without(walk, spans, period)
-        rows = np.concatenate([ends.rows, number[np.asarray(rows, int)]])
+        ends = cls._without(walk, spans, period)
+        rows = np.concatenate([ends.rows, ends.number[np.asarray(rows, int)]])
         order = np.argsort(rows, kind="stable")
-        return cls(ends.walk, rows[order], np.concatenate([ends.seconds, seconds])[order])
+        return cls(ends.walk, rows[order], np.concatenate([ends.seconds, seconds])[order], ends.number)
+
+    def of_walk(self, values):
+        """What belongs to the samples that are left, of what belongs to those with the pauses.
+
+        Parameters
+        ----------
+        values : (M, ...) array
+
+        Returns
+        -------
+        (N, ...) array
+            Of each sample in which somebody stood the first.
+        """
+        return values[np.unique(self.number, return_index=True)[1]]
 
     @property
     def inner(self):
@@ -138,17 +155,17 @@ class Stands:
 
     @classmethod
     def _without(cls, walk, spans, period):
-        """The walk without spans (first, last), and at which of its samples each of the walk's is then."""
+        """The walk without spans (first, last)."""
         kept = np.ones(len(walk), bool)
         places = walk.copy()
         for first, last in spans:
             places[first] = walk[first : last + 1].mean(axis=0)
             kept[first + 1 : last + 1] = False
         if not spans or kept.sum() < 3 or not (places[kept] != places[kept][0]).any():
-            return cls(walk, np.zeros(0, int), np.zeros(0)), np.arange(len(walk))
+            return cls(walk, np.zeros(0, int), np.zeros(0), np.arange(len(walk)))
         number = np.cumsum(kept) - 1
         rows = number[[first for first, _ in spans]]
-        return cls(places[kept], rows, period * np.array([b - a for a, b in spans], float)), number
+        return cls(places[kept], rows, period * np.array([b - a for a, b in spans], float), number)
 
 
 def apart_within(length):

@@ -21,14 +21,15 @@ from dollop.checks import (
     checked_wholes,
     put_in,
 )
+from dollop.law.timing import Stands, apart_within, pooled
 from dollop.learning.frames import frames_like
 from dollop.learning.places import Places
 from dollop.learning.ways import PLACES
 from dollop.pose import rotation
-from dollop.sequenced_lds import LEAST_REACH, PERIODS, SequencedLDS, check_times
+from dollop.sequenced_lds import LEAST_REACH, LONGEST_PAUSE, PERIODS, SequencedLDS, check_times
 from dollop.trajectory import align, arc_length, check_trajectory, resample
 
-__all__ = ["Way", "curve_of", "way_of", "which_places"]
+__all__ = ["Way", "curve_of", "pooled_along", "way_of", "which_places"]
 
 WEIGHTS, ROUNDING = (-1, 2), 1e-6
 """What a weight can be: smooth ones go a little beyond 0 and 1; and what those of a place may miss 1 by."""
@@ -63,6 +64,11 @@ class Way:
         Of the walks, in s.
     tolerance : float
         Largest mean error of a segment of the law in m.
+    pauses : (P, 2) float array, optional
+        Where along the places, from 0 to L - 1, and how long in s the demonstrators stood: the walks
+        are then without it. By default it is found in the walks, and taken out of them. Who stands
+        at an end of a walk (see `dollop.law.timing.apart_within`) waits for the recording, and not
+        for the task: that is no pause of it.
 
     Raises
     ------
@@ -81,6 +87,7 @@ class Way:
     covered: tuple
     sample_period: float
     tolerance: float
+    pauses: np.ndarray | None = None
 
     def __post_init__(self):
         walks = tuple(map(check_trajectory, checked_records("walks", self.walks, object)))
@@ -114,6 +121,20 @@ class Way:
             raise ValueError("the last frame of a way must be the world, and no other")
         covered = checked_array("covered", self.covered, len(self.members), 2, least=-FARTHEST, most=FARTHEST)
         put_in(self, covered=tuple(map(tuple, covered.tolist())))
+        if self.pauses is None:
+            self._find_pauses()
+        pauses = checked_array("pauses", self.pauses, "P", 2, least=0, most=LONGEST_PAUSE)
+        if (np.diff(pauses[:, 0]) < 0).any() or pauses[:, 0].max(initial=0) > len(home) - 1:
+            raise ValueError(f"pauses must be in order, at places 0 to {len(home) - 1}, got {pauses[:, 0].tolist()}")
+        put_in(self, pauses=pauses)
+
+    def _find_pauses(self):
+        """Take what pauses the walks have out of them, and pool them."""
+        stands = [Stands.of(walk, self.sample_period, "inner") for walk in self.walks]
+        shares = [each.of_walk(share) for each, share in zip(stands, self.shares, strict=True)]
+        at = [share[each.rows] for each, share in zip(stands, shares, strict=True)]
+        pauses = pooled_along(at, [each.seconds for each in stands], self.home, lambda place: len(stands))
+        put_in(self, walks=tuple(each.walk for each in stands), shares=tuple(shares), pauses=pauses)
 
     def __repr__(self):
         return f"Way of {len(self.home)} places, shown {len(self.members)} x"
@@ -169,14 +190,17 @@ class Way:
 
         Returns
         -------
-        list of (N_k, 2) float arrays
-            In m.
+        list of Stands
+            In m; the pauses are as long as they were shown, where their places are now.
         """
-        if np.allclose(now, self.home, rtol=0, atol=1e-9):
-            return list(self.walks)
-        displaced = scipy.interpolate.CubicSpline(np.arange(len(now)), now - self.home)
-        pairs = zip(self.walks, self.shares, strict=True)
-        return [_at_shown_speed(walk, walk + displaced(share)) for walk, share in pairs]
+        places, seconds = self.pauses.T
+        rows = [np.abs(share - places[:, None]).argmin(axis=1) for share in self.shares]
+        walks = list(self.walks)
+        if not np.allclose(now, self.home, rtol=0, atol=1e-9):
+            displaced = scipy.interpolate.CubicSpline(np.arange(len(now)), now - self.home)
+            moved = [walk + displaced(share) for walk, share in zip(walks, self.shares, strict=True)]
+            walks, rows = zip(*map(_at_shown_speed, walks, moved, rows), strict=True)
+        return [Stands.known(walk, self.sample_period, row, seconds) for walk, row in zip(walks, rows, strict=True)]
 
     def law(self, now):
         """The control law along the places as they are now (Sec. III).
@@ -189,6 +213,7 @@ class Way:
         Returns
         -------
         law : SequencedLDS
+            It waits where the demonstrators did, and neither at its start nor at its end.
         tolerance : float
             That it keeps, in m: larger than the way's where it bends too sharply for that, as the
             walks that were shown do not.
@@ -198,25 +223,67 @@ class Way:
         ValueError
             Where the walks that were shown cannot be segmented at their tolerance.
         """
-        walks, tolerance = self.walked(now), self.tolerance
+        stands, tolerance = self.walked(now), self.tolerance
+        at_home = np.allclose(now, self.home, rtol=0, atol=1e-9)
         for _ in range(LOOSER):
             try:
-                return SequencedLDS.fit(walks, tolerance, sample_period=self.sample_period), tolerance
+                return self._fitted(stands, tolerance), tolerance
             except ValueError:
-                if walks[0] is self.walks[0] and len(self.members) == 1:
+                if at_home and len(self.members) == 1:
                     raise
                 tolerance *= 2
-        return SequencedLDS.fit(walks, tolerance, sample_period=self.sample_period), tolerance
+        return self._fitted(stands, tolerance), tolerance
+
+    def _fitted(self, stands, tolerance):
+        law = SequencedLDS.fit_stands(stands, tolerance, sample_period=self.sample_period)
+        return law.without_waits_at_ends()
 
 
-def _at_shown_speed(before, after):
-    """A walk (N, 2) moved from `before`, sampled anew so that each step keeps its speed."""
+def _at_shown_speed(before, after, stops=()):
+    """A walk (N, 2) moved from `before`, sampled anew so that each step keeps its speed.
+
+    And at which samples it then stops that stopped at samples `stops` (P,).
+    """
     was, now = (np.linalg.norm(np.diff(walk, axis=0), axis=1) for walk in (before, after))
     stretched = np.clip(now / np.maximum(was, 1e-9), SLOWER, FASTER)
     time = np.concatenate([[0.0], np.where(was > 1e-9, stretched, 1.0).cumsum()])
-    count = max(3, round(time[-1]) + 1)
-    at = np.linspace(0, time[-1], count)
-    return np.stack([np.interp(at, time, column) for column in after.T], axis=1)
+    at, stops = _ticks(time[-1], time[np.asarray(stops, int)])
+    return np.stack([np.interp(at, time, column) for column in after.T], axis=1), stops
+
+
+def _ticks(lasting, stops):
+    """Times from 0 to `lasting`, about 1 apart, and which of them are those of the stops (P,)."""
+    ends = np.concatenate([[0.0], stops, [lasting]])
+    counts = np.maximum(np.rint(np.diff(ends)).astype(int), np.diff(ends) > 0)
+    counts[-1] = max(counts[-1], 2 - counts[:-1].sum())
+    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
+    return np.append(np.concatenate(parts), lasting), counts[:-1].cumsum()
+
+
+def pooled_along(at, seconds, places, count):
+    """The pauses that walks have in common (see `dollop.law.timing.pooled`).
+
+    Parameters
+    ----------
+    at : sequence of K (P_k,) float arrays
+        Where along the places, 0 to L - 1, each walk stood.
+    seconds : sequence of K (P_k,) float arrays
+        How long.
+    places : (L, 2) float array
+        In m.
+    count : callable
+        How many walks there are at a place.
+
+    Returns
+    -------
+    (P, 2) float array
+        Where along the places, and how long in s.
+    """
+    pairs = enumerate(zip(at, seconds, strict=True))
+    found = [(a, s, k) for k, (where, long) in pairs for a, s in zip(where.tolist(), long.tolist(), strict=True)]
+    length = arc_length(places)[-1]
+    apart = max(apart_within(length) / max(length, LEAST_REACH) * (len(places) - 1), 1.0)
+    return np.array(pooled(found, count, apart)).reshape(-1, 2)
 
 
 def curve_of(walks):
@@ -265,9 +332,9 @@ def way_of(members, laid, frames, home, shown, curves):
     home : Frames
         Of the environment to learn in.
     shown : sequence of K demonstrations
-        With `walks`, `sample_period` and `tolerance`.
+        With `stands`, `sample_period` and `tolerance`.
     curves : sequence of K (curve, moments)
-        From `curve_of`.
+        From `curve_of`, of their walks without the pauses.
 
     Returns
     -------
@@ -278,16 +345,36 @@ def way_of(members, laid, frames, home, shown, curves):
     covered = tuple(_range_of(row) for row in laid.covered)
     tolerance = min(each.tolerance for each in shown)
     period = float(np.median([each.sample_period for each in shown]))
-    if len(members) == 1:
-        walks = tuple(shown[0].walks)
+    alone = len(members) == 1
+    at_home = laid.points[0] if alone else places.among(home)[0]
+    pauses = _pauses(laid, shown, curves, at_home)
+    if alone:
+        walks = tuple(each.walk for each in shown[0].stands)
         shares = tuple(_share_of(walk, at) for walk, at in zip(walks, curves[0][1], strict=True))
-        at_home = laid.points[0]
     else:
-        at_home = places.among(home)[0]
-        pace = _pace(laid, shown, curves)
-        walk, share = _timed(at_home, pace, period)
+        walk, share = _timed(at_home, _pace(laid, shown, curves), period, pauses[:, 0])
         walks, shares = (walk,), (share,)
-    return Way(walks, shares, at_home, *known, covered, period, tolerance)
+    return Way(walks, shares, at_home, *known, covered, period, tolerance, pauses)
+
+
+def _pauses(laid, shown, curves, places):
+    """Where along the places (L, 2), and how long in s, the demonstrators stood: (P, 2)."""
+    at, seconds, walks = [], [], np.zeros(len(places))
+    for where, covered, each, (_, moments) in zip(laid.at, laid.covered, shown, curves, strict=True):
+        walks += len(moments) * covered
+        inside = np.flatnonzero(covered)
+        for stands, moment in zip(each.stands, moments, strict=True):
+            sample = _share_of(stands.walk, moment)[stands.rows]
+            there = (sample >= where[inside[0]]) & (sample <= where[inside[-1]])
+            at.append(np.interp(sample[there], *_rising(where[inside], inside)))
+            seconds.append(stands.seconds[there])
+    return pooled_along(at, seconds, places, lambda place: walks[round(place)])
+
+
+def _rising(values, numbers):
+    """Values that never fall, without those that stay, and their numbers: the middle of those."""
+    values, which = np.unique(values, return_inverse=True)
+    return values, np.bincount(which, numbers) / np.bincount(which)
 
 
 def _range_of(covered):
@@ -317,13 +404,17 @@ def _pace(laid, shown, curves):
     return np.where(weight > 0, taken / np.maximum(weight, 1), typical)
 
 
-def _timed(places, pace, period):
-    """A walk along places (L, 2) that takes `pace` (L - 1,) in s between them, and its share along them."""
+def _timed(places, pace, period, stops=()):
+    """A walk along places (L, 2) that takes `pace` (L - 1,) in s between them, and its share along them.
+
+    Some samples are at `stops` (P,), shares along the places.
+    """
     pace = np.maximum(pace, 1e-3 * period)
     time = np.concatenate([[0.0], pace.cumsum()])
     check_times(time[-1], period)
-    count = max(3, round(time[-1] / period) + 1)
-    share = np.interp(np.linspace(0, time[-1], count), time, np.arange(len(places)))
+    at, rows = _ticks(time[-1] / period, np.interp(stops, np.arange(len(places)), time) / period)
+    share = np.interp(at * period, time, np.arange(len(places)))
+    share[rows] = stops
     return scipy.interpolate.CubicSpline(np.arange(len(places)), places)(share), share
 
 
