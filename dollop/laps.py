@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 
 from dollop.checks import LATEST, Note, checked_array
+from dollop.law.timing import Stands, apart_within
 from dollop.trajectory import arc_length, check_trajectory, resample
 
 __all__ = ["Cut", "cut_laps", "laps"]
@@ -127,8 +128,9 @@ def cut_laps(t, positions):
     run beside no other lap, are dropped. The gate is a line across the track; a lap begins where
     the track crosses it in the gate's direction, about one lap after the last time, so that the
     second visit to a figure-eight's crossing opens no lap. Of all gates on the first lap the one
-    with the most laps is taken, and among those the one that is passed most narrowly. What is left
-    at head and tail is dropped, and told.
+    with the most laps is taken, among those one where nobody pauses, so that a pause is within the
+    laps, and among those the one that is passed most narrowly. What is left at head and tail is
+    dropped, and told.
 
     A walk is kept whole unless at least two full laps of one task are most of the way (60 %): one lap
     and a half show nothing twice from end to end, and who walked them may mean just that. Laps
@@ -161,7 +163,7 @@ def cut_laps(t, positions):
     [(2, 0.2), (1, 0.0)]
     """
     t, points = even_clock(t, check_trajectory(positions, "positions"))
-    cuts, doubt = lap_cuts(points)
+    cuts, doubt = lap_cuts(points, where_stood(t, points))
     walked = way(points)[0]
     parts = [points[start : end + 1] for start, end in pairwise(cuts)]
     before, after = walked[cuts[0]], walked[-1] - walked[cuts[-1]]
@@ -217,14 +219,23 @@ def way(points):
     return walked, np.array(vertices)
 
 
-def lap_cuts(points):
-    """Samples of a track (N, 2) at which laps begin and the last ends, and why there are none."""
+def where_stood(t, points):
+    """Samples of a track (N, 2) at even times (N,) in s at which somebody pauses on the way."""
+    stands = Stands.of(points, t[1] - t[0], "inner")
+    return np.searchsorted(stands.number, stands.rows)
+
+
+def lap_cuts(points, stood=()):
+    """Samples of a track (N, 2) at which laps begin and the last ends, and why there are none.
+
+    And those where somebody `stood` (P,), which are no good places to cut.
+    """
     walked, vertices = way(points)
     corners = points[np.append(vertices, len(points) - 1)]
     n = max(len(points), 100)
     track, step, doubt = resample(corners, n), walked[-1] / (n - 1), ""
     for lag in islice(lap_lags(track), TRIALS):
-        cuts = cuts_at(points, walked, corners, lag * step)
+        cuts = cuts_at(points, walked, corners, lag * step, walked[np.asarray(stood, int)])
         fault, after = (
             why_too_few(walked, cuts),
             f"it seems to repeat itself after {lag * step:.1f} m",
@@ -275,8 +286,11 @@ def distances_apart(track, lag):
     return np.median(gaps), (sums[window:] - sums[:-window]).min() / window
 
 
-def cuts_at(points, walked, corners, lap):
-    """Samples at which laps of about a known length in m begin, and where the last ends."""
+def cuts_at(points, walked, corners, lap, stood=()):
+    """Samples at which laps of about a known length in m begin, and where the last ends.
+
+    Somebody `stood` after so many m (P,).
+    """
     n = int(np.ceil(min(max(len(points), 100), LAP_POINTS * walked[-1] / lap)))
     track, step = resample(corners, n), walked[-1] / (n - 1)
     lag = max(1, round(lap / step))
@@ -286,7 +300,7 @@ def cuts_at(points, walked, corners, lap):
     ends = first_run(later <= width, run), n - 1 - first_run(earlier <= width, run)
     first, last = np.searchsorted(walked, np.array(ends) * step)
     last = len(points) - 1 if ends[1] == n - 1 else last  # who stands at the end is still there
-    cuts = best_cuts(points[first : last + 1], walked[first : last + 1], lap, width)
+    cuts = best_cuts(points[first : last + 1], walked[first : last + 1], lap, width, stood)
     return [int(first + cut) for cut in cuts]
 
 
@@ -309,14 +323,17 @@ def first_run(beside, run):
     return int(np.argmax(np.convolve(beside, np.ones(run), "valid") > run - 0.5))
 
 
-def best_cuts(points, walked, lap, width):
+def best_cuts(points, walked, lap, width, stood=()):
     """Crossings of the gate with the most laps, among those of the most narrowly passed.
+
+    Where somebody `stood` after so many m (P,) is no gate if there is another with as many laps.
 
     A walk that ends a little before the gate has a last lap as well: if it is as long as others, or,
     rather than none, if it ends near the gate.
     """
+    stood, apart = np.asarray(stood) - walked[0], apart_within(lap)
     end, walked = len(points) - 1, walked - walked[0]
-    best, best_rank = [0, end], (2, True, -np.inf)
+    best, best_rank = [0, end], (2, True, False, -np.inf)
     gates = np.flatnonzero(walked < lap)
     for gate in gates[:: -(-len(gates) // GATES)]:
         found = gate_crossings(points, walked, gate, lap, width)
@@ -326,7 +343,8 @@ def best_cuts(points, walked, lap, width):
         nearly = not full and near and abs(rest - lap) < LAP_SPREAD * lap
         found = [*found, end] if full or nearly else found
         narrow = -np.linalg.norm(points[found] - points[gate], axis=1).max()
-        rank = len(found), not nearly, narrow
+        passed = not (np.abs(walked[found] - stood[:, None]) <= apart).any()
+        rank = len(found), not nearly, passed, narrow
         best, best_rank = (found, rank) if rank >= best_rank else (best, best_rank)
     return best
 

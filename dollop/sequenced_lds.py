@@ -19,6 +19,7 @@ from dollop.checks import (
 from dollop.law.line import check_ends, lines_of
 from dollop.law.timing import (
     CORNER,
+    OVER,
     SOONEST,
     Stands,
     on_cuts,
@@ -28,6 +29,7 @@ from dollop.law.timing import (
     turns_at,
 )
 from dollop.lds import LDS, MOST_STEPS, Statistics
+from dollop.pose import wrapped
 from dollop.segmentation import (
     best_segments,
     cuts_within,
@@ -131,6 +133,33 @@ class SequencedLDS:
     def subgoals(self):
         """(K, 2) float array: where the segments end, m."""
         return np.array([segment.goal for segment in self.segments])
+
+    @property
+    def headings(self):
+        """(K + 1,) float array: where the law leads at the start, and at each subgoal as it arrives, rad.
+
+        In (-pi, pi], over a decimetre of `lines`. A laser cannot tell where somebody who stands looks:
+        this is the direction of the walk.
+
+        Examples
+        --------
+        Two metres along x, one along y:
+
+        >>> corner = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]]
+        >>> law = SequencedLDS.fit(resample(corner, 61))
+        >>> np.degrees(law.headings[[0, -1]]).round() + 0.0
+        array([ 0., 90.])
+        """
+        lines = [line.places for line in self.lines()]
+        ends = [arc_length(line)[-1] for line in lines]
+        spans = [
+            (lines[0], 0.0, OVER),
+            *((line, end - OVER, end) for line, end in zip(lines, ends, strict=True)),
+        ]
+        x, y = np.array([np.diff(at_arc_length(line, (a, b)), axis=0)[0] for line, a, b in spans]).T
+        moved = np.hypot(x, y) > LEAST_REACH
+        known = np.maximum.accumulate(np.where(moved, np.arange(len(x)), 0))  # who stays has come as before
+        return wrapped(np.arctan2(y, x))[known]
 
     @classmethod
     def fit(
@@ -740,7 +769,11 @@ def cut_at_pauses(stands, aligned, shares):
     moved = 2 * np.interp(fine / 2, np.arange(count), moved)
     shares = np.stack([np.interp(moved, fine, share) for share in shares])
     pairs = zip((each.walk for each in stands), shares, strict=True)
-    return seconds, np.stack([at_arc_length(walk, share * arc_length(walk)[-1]) for walk, share in pairs]), shares
+    return (
+        seconds,
+        np.stack([at_arc_length(walk, share * arc_length(walk)[-1]) for walk, share in pairs]),
+        shares,
+    )
 
 
 def cut_moments(walks, shares):

@@ -285,7 +285,7 @@ class Task:
         environment, shown = demonstration.environment, (demonstration,)
         partners = (np.arange(len(environment)),)
         if method == "paper":
-            law = demonstration.law
+            law = demonstration.law.without_waits_at_ends()
             tied = associate(anchors(law), environment, m=max(1, len(environment.corners)))
             return cls(law, environment, tied, None, shown, notes_of(shown), partners=partners)
         ways, _, notes = learn_anchored(shown, partners, environment, merged=False)

@@ -10,6 +10,7 @@ from dollop.trajectory import arc_length, at_arc_length
 
 __all__ = [
     "CORNER",
+    "OVER",
     "PARTS",
     "SOONEST",
     "Stands",
@@ -369,7 +370,10 @@ def on_cuts(pauses, count, length):
         moved = np.interp(np.arange(count), [0, *cuts, last], [0, *at, last])
     ends = [(0 if where <= apart else last, each) for where, each in pauses if (where, each) not in inner]
     seconds = {}
-    for cut, each in [*ends, *((cut, each) for cut, (_, each) in zip(cuts.tolist(), inner, strict=True))]:
+    for cut, each in [
+        *ends,
+        *((cut, each) for cut, (_, each) in zip(cuts.tolist(), inner, strict=True)),
+    ]:
         seconds[cut] = seconds.get(cut, 0.0) + each
     return seconds, moved
 
