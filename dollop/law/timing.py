@@ -243,11 +243,14 @@ def _narrowed(walk, first, last, width):
     if first == 0 or last == len(walk) - 1:
         near = np.flatnonzero(np.hypot(*(samples - samples.mean(axis=0)).T) <= STILL)
         return (first + near[0], first + near[-1]) if len(near) else (first, first)
-    away = np.hypot(*(samples - uniform_filter1d(samples, width, axis=0)).T)
-    reach = np.clip(2 * np.median(away), CREEP, STILL)
-    begin, end = _middle(samples[: 2 * width]), _middle(samples[-2 * width :])
-    at_begin, at_end = (np.flatnonzero(np.hypot(*(samples - place).T) <= reach) for place in (begin, end))
-    return (first + at_begin[0], first + at_end[-1]) if len(at_begin) and len(at_end) else (first, first)
+    begins, ends = _of_the_place(samples[: 2 * width]), _of_the_place(samples[-2 * width :])
+    return first + begins[0], last + 1 - len(samples[-2 * width :]) + ends[-1]
+
+
+def _of_the_place(samples):
+    """Which of some samples (N, 2) are not steps to or from the place where most of them are."""
+    away = np.hypot(*(samples - _middle(samples)).T)
+    return np.flatnonzero(away <= np.clip(2 * np.median(away), CREEP, STILL))
 
 
 def _middle(samples):
