@@ -762,7 +762,7 @@ def cut_at_pauses(stands, aligned, shares):
     As they are where nobody pauses on the way.
     """
     length, count = arc_length(aligned.mean(axis=0)[::2])[-1], aligned.shape[1] // 2 + 1
-    seconds, moved = on_cuts(shown_pauses(stands, shares[:, ::2], length), count, length)
+    seconds, moved = on_cuts(shown_pauses(stands, shares[:, ::2], length), count)
     if (moved == np.arange(count)).all():
         return seconds, aligned, shares
     fine = np.arange(2 * count - 1)

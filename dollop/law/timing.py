@@ -1,6 +1,7 @@
 """When a demonstrator was where: pauses, and the speed along each segment (beyond the paper)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import fsum
 
 import numpy as np
@@ -12,6 +13,7 @@ __all__ = [
     "CORNER",
     "OVER",
     "PARTS",
+    "SHARE",
     "SOONEST",
     "Stands",
     "apart_within",
@@ -36,8 +38,9 @@ CREEP = 1e-3
 ROUNDS = 3
 """How often a middle is sought anew: then it hardly moves any more."""
 APART, SHARE = 0.5, 0.1
-"""Way in m, and share of a shorter walk, over which stands are one pause, and within which of an end of a
-walk they are at that end: a step is longer."""
+"""Way in m, or share of a shorter walk, over which stands of one walk are one pause, and within which of an
+end they are at that end: a step is longer. Stands of several walks are one pause over that share of the way:
+so far walks among objects that have moved slip along each other."""
 PARTS = 16
 """Parts of a segment, each of which has its speed: a person speeds up within a metre, and a segment
 is about three metres long."""
@@ -60,14 +63,20 @@ class Stands:
         Which samples.
     seconds : (P,) float array
         How long each lasted.
+    inner : (P,) bool array
+        Which of them are on the way, and not at an end of the walk (see `apart_within`).
     number : (M,) int array
         For each sample with the pauses which one it is without.
+    pooled : bool
+        Whether the inner ones are those that all walks of a way have in common, in order.
     """
 
     walk: np.ndarray
     rows: np.ndarray
     seconds: np.ndarray
+    inner: np.ndarray
     number: np.ndarray
+    pooled: bool = False
 
     @classmethod
     def of(cls, walk, period, which="all"):
@@ -101,9 +110,9 @@ class Stands:
         found = cls._without(walk, spans, period)
         if which == "all" or not len(found.rows):
             return found
-        inner = found.inner
-        chosen = inner if which == "inner" else ~inner
-        return cls._without(walk, [span for span, of in zip(spans, chosen, strict=True) if of], period)
+        chosen = found.inner == (which == "inner")
+        found = cls._without(walk, [span for span, of in zip(spans, chosen, strict=True) if of], period)
+        return replace(found, inner=np.full(len(found.rows), which == "inner"))
 
     @classmethod
     def known(cls, walk, period, rows, seconds):
@@ -125,13 +134,10 @@ class Stands:
         Stands
             Of those, and of the stands that the walk has at its ends.
         """
-        spans = _spans(walk, period)
-        inner = cls._without(walk, spans, period).inner
-        spans = [span for span, of in zip(spans, inner, strict=False) if not of]
-        ends = cls._without(walk, spans, period)
-        rows = np.concatenate([ends.rows, ends.number[np.asarray(rows, int)]])
-        order = np.argsort(rows, kind="stable")
-        return cls(ends.walk, rows[order], np.concatenate([ends.seconds, seconds])[order], ends.number)
+        ends, rows = cls.of(walk, period, "ends"), np.asarray(rows, int)
+        rows, seconds = np.concatenate([ends.rows, ends.number[rows]]), np.concatenate([ends.seconds, seconds])
+        inner, order = np.arange(len(rows)) >= len(ends.rows), np.argsort(rows, kind="stable")
+        return cls(ends.walk, rows[order], seconds[order], inner[order], ends.number, pooled=True)
 
     def of_walk(self, values):
         """What belongs to the samples that are left, of what belongs to those with the pauses.
@@ -147,13 +153,6 @@ class Stands:
         """
         return values[np.unique(self.number, return_index=True)[1]]
 
-    @property
-    def inner(self):
-        """(P,) bool array: which of them are not at an end of the walk (see `apart_within`)."""
-        way = arc_length(self.walk)
-        at, apart = way[self.rows], apart_within(way[-1])
-        return (at > apart) & (at < way[-1] - apart)
-
     @classmethod
     def _without(cls, walk, spans, period):
         """The walk without spans (first, last)."""
@@ -163,10 +162,13 @@ class Stands:
             places[first] = walk[first : last + 1].mean(axis=0)
             kept[first + 1 : last + 1] = False
         if not spans or kept.sum() < 3 or not (places[kept] != places[kept][0]).any():
-            return cls(walk, np.zeros(0, int), np.zeros(0), np.arange(len(walk)))
-        number = np.cumsum(kept) - 1
-        rows = number[[first for first, _ in spans]]
-        return cls(places[kept], rows, period * np.array([b - a for a, b in spans], float), number)
+            none = np.zeros(0)
+            return cls(walk, none.astype(int), none, none.astype(bool), np.arange(len(walk)))
+        number, places = np.cumsum(kept) - 1, places[kept]
+        rows, seconds = number[[first for first, _ in spans]], [period * (b - a) for a, b in spans]
+        way = arc_length(places)
+        at, apart = way[rows], apart_within(way[-1])
+        return cls(places, rows, np.array(seconds), (at > apart) & (at < way[-1] - apart), number)
 
 
 def apart_within(length):
@@ -277,18 +279,27 @@ def shown_pauses(stands, shares, length):
     -------
     list of (float, float)
         At which candidate cut, as a fractional number, and the mean pause in s, where at least half
-        of the walks stood.
+        of the walks stood; those at the ends of the walks are at the first and the last.
     """
-    found = []
+    inner, first, last, end = [], [], [], shares.shape[1] - 1.0
     for k, each in enumerate(stands):
         way = arc_length(each.walk)
-        at = np.interp(way[each.rows] / way[-1], shares[k], np.arange(shares.shape[1]))
-        found += zip(at.tolist(), each.seconds.tolist(), [k] * len(at), strict=True)
-    apart = max(apart_within(length) / length * (shares.shape[1] - 1), 2.0)
-    return pooled(found, lambda at: len(stands), apart)
+        at = np.interp(way[each.rows] / way[-1], shares[k], np.arange(end + 1))
+        for where, seconds, of in zip(at.tolist(), each.seconds.tolist(), each.inner.tolist(), strict=True):
+            kind = inner if of else first if where < end / 2 else last
+            kind.append((where, seconds, k))
+    at_ends = (0.0, first), (end, last)
+    ends = [pooled([(at, *each[1:]) for each in kind], lambda _: len(stands), 0, 0) for at, kind in at_ends]
+    if all(each.pooled for each in stands):
+        by_walk = [[each[:2] for each in inner if each[2] == k] for k in range(len(stands))]
+        means = [np.mean(each, axis=0).tolist() for each in zip(*by_walk, strict=True)]
+    else:
+        within, between = apart_within(length) / length * end, SHARE * end
+        means = pooled(inner, lambda _: len(stands), max(within, 2.0), max(between, 2.0))
+    return [*ends[0], *map(tuple, means), *ends[1]]
 
 
-def pooled(found, count, apart):
+def pooled(found, count, within, between):
     """The pauses that walks have in common, each as long as on the mean of all walks.
 
     Parameters
@@ -297,8 +308,9 @@ def pooled(found, count, apart):
         Where along the way, how long in s, and in which walk somebody stood.
     count : callable
         How many walks there are at a place.
-    apart : float
-        How far apart along the way stands of several walks, or of one, are one pause.
+    within, between : float
+        How far apart along the way stands of one walk, and of several, are one pause. Of several
+        walks the nearest are put together first, and never two of one walk.
 
     Returns
     -------
@@ -308,30 +320,45 @@ def pooled(found, count, apart):
 
     Examples
     --------
-    >>> pooled([(3.0, 2.0, 0), (7.0, 9.0, 0), (3.2, 4.0, 1)], lambda at: 3, 0.5)
+    >>> pooled([(3.0, 2.0, 0), (7.0, 9.0, 0), (3.2, 4.0, 1)], lambda at: 3, 0.5, 1.2)
     [(3.1, 2.0)]
     """
     pauses = []
-    for group in _grouped(sorted(found), apart):
+    for group in _together(_of_each_walk(found, within), between):
         at, seconds, walks = zip(*group, strict=True)
         middle = fsum(at) / len(at)
-        if len(set(walks)) >= count(middle) / 2:
-            pauses.append((middle, fsum(seconds) / max(count(middle), len(set(walks)))))
+        if len(walks) >= count(middle) / 2:
+            pauses.append((middle, fsum(seconds) / max(count(middle), len(walks))))
     return pauses
 
 
-def _grouped(found, apart):
-    """Sorted tuples in groups, in each of which the first entries are at most so far from the first."""
-    groups = []
-    for each in found:
-        if groups and each[0] - groups[-1][0][0] <= apart:
-            groups[-1].append(each)
-        else:
-            groups.append([each])
-    return groups
+def _of_each_walk(found, within):
+    """The same, in order, where stands of one walk that are so near to the one before are one with it."""
+    single = {}
+    for at, seconds, walk in sorted(found):
+        mine = single.setdefault(walk, [])
+        if mine and at - mine[-1][0] <= within:
+            seconds += mine.pop()[1]
+        mine.append((at, seconds, walk))
+    return sorted(each for mine in single.values() for each in mine)
 
 
-def on_cuts(pauses, count, length):
+def _together(found, between):
+    """Groups of tuples that are in order, the nearest neighbours first, of one walk at most one in each."""
+    groups = [[each] for each in found]
+    while True:
+        middles = [fsum(each[0] for each in group) / len(group) for group in groups]
+        walks = [{each[2] for each in group} for group in groups]
+        gaps = [
+            (b - a, k) for k, (a, b) in enumerate(pairwise(middles)) if b - a <= between and not walks[k] & walks[k + 1]
+        ]
+        if not gaps:
+            return groups
+        k = min(gaps)[1]
+        groups[k : k + 2] = [groups[k] + groups[k + 1]]
+
+
+def on_cuts(pauses, count):
     """Cuts for pauses, and where the candidates must be moved to for it.
 
     A pause that is not at an end has a cut of its own, and two candidates at least on either side of
@@ -343,8 +370,6 @@ def on_cuts(pauses, count, length):
         At which candidate, as a fractional number, and how long in s; in order.
     count : int
         How many candidates there are at equal distances, C.
-    length : float
-        Of the way, m.
 
     Returns
     -------
@@ -355,28 +380,21 @@ def on_cuts(pauses, count, length):
 
     Examples
     --------
-    >>> seconds, moved = on_cuts([(4.4, 3.0)], 9, 4.0)
+    >>> seconds, moved = on_cuts([(4.4, 3.0)], 9)
     >>> seconds, moved
     ({4: 3.0}, array([0. , 1.1, 2.2, 3.3, 4.4, 5.3, 6.2, 7.1, 8. ]))
     """
-    last = count - 1
-    apart = apart_within(length) / length * last
-    inner = [each for each in pauses if apart < each[0] < last - apart]
+    last, at = count - 1, np.array([where for where, _ in pauses])
+    inner = np.unique(at[(at > 0) & (at < last)])
     room = 2 * np.arange(1, len(inner) + 1)
-    at = np.array([where for where, _ in inner])
-    cuts = np.maximum.accumulate(np.maximum(np.rint(at), 2) - room) + room
+    cuts = np.maximum.accumulate(np.maximum(np.rint(inner), 2) - room) + room
     cuts = np.minimum(cuts, last - room[::-1]).astype(int)
-    if len(cuts) and cuts.min() < 2:  # more pauses than there is room for
-        cuts = np.rint(at).astype(int)
-        moved = np.arange(count, dtype=float)
+    if cuts.min(initial=2) < 2:  # more pauses than there is room for
+        cuts, moved = np.rint(inner).astype(int), np.arange(count, dtype=float)
     else:
-        moved = np.interp(np.arange(count), [0, *cuts, last], [0, *at, last])
-    ends = [(0 if where <= apart else last, each) for where, each in pauses if (where, each) not in inner]
+        moved = np.interp(np.arange(count), [0, *cuts, last], [0, *inner, last])
     seconds = {}
-    for cut, each in [
-        *ends,
-        *((cut, each) for cut, (_, each) in zip(cuts.tolist(), inner, strict=True)),
-    ]:
+    for cut, (_, each) in zip(np.interp(at, [0, *inner, last], [0, *cuts, last]).round().astype(int).tolist(), pauses, strict=True):
         seconds[cut] = seconds.get(cut, 0.0) + each
     return seconds, moved
 

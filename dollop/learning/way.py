@@ -21,7 +21,7 @@ from dollop.checks import (
     checked_wholes,
     put_in,
 )
-from dollop.law.timing import Stands, apart_within, pooled
+from dollop.law.timing import SHARE, Stands, apart_within, pooled
 from dollop.learning.frames import frames_like
 from dollop.learning.places import Places
 from dollop.learning.ways import PLACES
@@ -281,9 +281,9 @@ def pooled_along(at, seconds, places, count):
     """
     pairs = enumerate(zip(at, seconds, strict=True))
     found = [(a, s, k) for k, (where, long) in pairs for a, s in zip(where.tolist(), long.tolist(), strict=True)]
-    length = arc_length(places)[-1]
-    apart = max(apart_within(length) / max(length, LEAST_REACH) * (len(places) - 1), 1.0)
-    return np.array(pooled(found, count, apart)).reshape(-1, 2)
+    length, last = max(arc_length(places)[-1], LEAST_REACH), len(places) - 1
+    within = apart_within(length) / length * last
+    return np.array(pooled(found, count, max(within, 1.0), SHARE * last)).reshape(-1, 2)
 
 
 def curve_of(walks):
