@@ -17,8 +17,8 @@ __all__ = [
     "SOONEST",
     "Stands",
     "apart_within",
+    "grouped",
     "on_cuts",
-    "pooled",
     "shown_pauses",
     "shown_profile",
     "times_along",
@@ -289,23 +289,23 @@ def shown_pauses(stands, shares, length):
             kind = inner if of else first if where < end / 2 else last
             kind.append((where, seconds, k))
     at_ends = (0.0, first), (end, last)
-    ends = [pooled([(at, *each[1:]) for each in kind], lambda _: len(stands), 0, 0) for at, kind in at_ends]
+    ends = [grouped([(at, *each[1:]) for each in kind], lambda _: len(stands), 0, 0) for at, kind in at_ends]
     if all(each.pooled for each in stands):
         by_walk = [[each[:2] for each in inner if each[2] == k] for k in range(len(stands))]
         means = [np.mean(each, axis=0).tolist() for each in zip(*by_walk, strict=True)]
     else:
         within, between = apart_within(length) / length * end, SHARE * end
-        means = pooled(inner, lambda _: len(stands), max(within, 2.0), max(between, 2.0))
-    return [*ends[0], *map(tuple, means), *ends[1]]
+        means = grouped(inner, lambda _: len(stands), max(within, 2.0), max(between, 2.0))
+    return [tuple(each[:2]) for each in (*ends[0], *means, *ends[1])]
 
 
-def pooled(found, count, within, between):
-    """The pauses that walks have in common, each as long as on the mean of all walks.
+def grouped(found, count, within, between):
+    """The pauses that walks have in common.
 
     Parameters
     ----------
-    found : list of (float, float, int)
-        Where along the way, how long in s, and in which walk somebody stood.
+    found : list of (float, float, int, ...)
+        Where along the way, how long in s, in which walk somebody stood, and what else is known.
     count : callable
         How many walks there are at a place.
     within, between : float
@@ -314,32 +314,31 @@ def pooled(found, count, within, between):
 
     Returns
     -------
-    list of (float, float)
-        Where and how long, in order, where at least half of the walks stood; who did not counts as
-        0 s.
+    list of (float, float, list)
+        Where, how long on the mean of all walks, who did not stand counting as 0 s, and what of
+        `found` that is; in order, where at least half of the walks stood.
 
     Examples
     --------
-    >>> pooled([(3.0, 2.0, 0), (7.0, 9.0, 0), (3.2, 4.0, 1)], lambda at: 3, 0.5, 1.2)
-    [(3.1, 2.0)]
+    >>> grouped([(3.0, 2.0, 0), (7.0, 9.0, 0), (3.2, 4.0, 1)], lambda at: 3, 0.5, 1.2)
+    [(3.1, 2.0, [(3.0, 2.0, 0), (3.2, 4.0, 1)])]
     """
     pauses = []
     for group in _together(_of_each_walk(found, within), between):
-        at, seconds, walks = zip(*group, strict=True)
-        middle = fsum(at) / len(at)
-        if len(walks) >= count(middle) / 2:
-            pauses.append((middle, fsum(seconds) / max(count(middle), len(walks))))
+        middle, number = fsum(each[0] for each in group) / len(group), len(group)
+        if number >= count(middle) / 2:
+            pauses.append((middle, fsum(each[1] for each in group) / max(count(middle), number), group))
     return pauses
 
 
 def _of_each_walk(found, within):
     """The same, in order, where stands of one walk that are so near to the one before are one with it."""
     single = {}
-    for at, seconds, walk in sorted(found):
+    for at, seconds, walk, *more in sorted(found):
         mine = single.setdefault(walk, [])
         if mine and at - mine[-1][0] <= within:
             seconds += mine.pop()[1]
-        mine.append((at, seconds, walk))
+        mine.append((at, seconds, walk, *more))
     return sorted(each for mine in single.values() for each in mine)
 
 

@@ -21,7 +21,7 @@ from dollop.checks import (
     checked_wholes,
     put_in,
 )
-from dollop.law.timing import SHARE, Stands, apart_within, pooled
+from dollop.law.timing import SHARE, Stands, apart_within, grouped
 from dollop.learning.frames import frames_like
 from dollop.learning.places import Places
 from dollop.learning.ways import PLACES
@@ -29,12 +29,14 @@ from dollop.pose import rotation
 from dollop.sequenced_lds import LEAST_REACH, LONGEST_PAUSE, PERIODS, SequencedLDS, check_times
 from dollop.trajectory import align, arc_length, check_trajectory, resample
 
-__all__ = ["Way", "curve_of", "pooled_along", "way_of", "which_places"]
+__all__ = ["Way", "curve_of", "in_common", "way_of", "which_places"]
 
 WEIGHTS, ROUNDING = (-1, 2), 1e-6
 """What a weight can be: smooth ones go a little beyond 0 and 1; and what those of a place may miss 1 by."""
 LOOSER = 4
 """Times that the tolerance of a law is doubled where objects bend its way too sharply."""
+FINE = 200
+"""Places between two stands of one pause that are tried for it: less than a centimetre apart."""
 SLOWER, FASTER = 0.2, 5.0
 """Most that a step of a walk may be shortened or stretched and still take the time that its new length takes."""
 
@@ -133,7 +135,9 @@ class Way:
         stands = [Stands.of(walk, self.sample_period, "inner") for walk in self.walks]
         shares = [each.of_walk(share) for each, share in zip(stands, self.shares, strict=True)]
         at = [share[each.rows] for each, share in zip(stands, shares, strict=True)]
-        pauses = pooled_along(at, [each.seconds for each in stands], self.home, lambda place: len(stands))
+        found = [(at, s, k) for k, each in enumerate(zip(at, stands, strict=True)) for at, s in _of_both(*each)]
+        pauses = in_common(found, self.home, lambda place: len(stands))
+        pauses = np.array([each[:2] for each in pauses]).reshape(-1, 2)
         put_in(self, walks=tuple(each.walk for each in stands), shares=tuple(shares), pauses=pauses)
 
     def __repr__(self):
@@ -260,30 +264,29 @@ def _ticks(lasting, stops):
     return np.append(np.concatenate(parts), lasting), counts[:-1].cumsum()
 
 
-def pooled_along(at, seconds, places, count):
-    """The pauses that walks have in common (see `dollop.law.timing.pooled`).
+def _of_both(at, stands):
+    """Pairs of where and how long."""
+    return zip(at.tolist(), stands.seconds.tolist(), strict=True)
+
+
+def in_common(found, places, count):
+    """The pauses that walks have in common.
 
     Parameters
     ----------
-    at : sequence of K (P_k,) float arrays
-        Where along the places, 0 to L - 1, each walk stood.
-    seconds : sequence of K (P_k,) float arrays
-        How long.
+    found, count
+        As for `dollop.law.timing.grouped`, along the places, 0 to L - 1.
     places : (L, 2) float array
         In m.
-    count : callable
-        How many walks there are at a place.
 
     Returns
     -------
-    (P, 2) float array
-        Where along the places, and how long in s.
+    list of (float, float, list)
+        As of `grouped`.
     """
-    pairs = enumerate(zip(at, seconds, strict=True))
-    found = [(a, s, k) for k, (where, long) in pairs for a, s in zip(where.tolist(), long.tolist(), strict=True)]
     length, last = max(arc_length(places)[-1], LEAST_REACH), len(places) - 1
     within = apart_within(length) / length * last
-    return np.array(pooled(found, count, max(within, 1.0), SHARE * last)).reshape(-1, 2)
+    return grouped(found, count, max(within, 1.0), SHARE * last)
 
 
 def curve_of(walks):
@@ -347,7 +350,7 @@ def way_of(members, laid, frames, home, shown, curves):
     period = float(np.median([each.sample_period for each in shown]))
     alone = len(members) == 1
     at_home = laid.points[0] if alone else places.among(home)[0]
-    pauses = _pauses(laid, shown, curves, at_home)
+    pauses = _pauses(laid, shown, curves, at_home, None if alone else places.among(frames))
     if alone:
         walks = tuple(each.walk for each in shown[0].stands)
         shares = tuple(_share_of(walk, at) for walk, at in zip(walks, curves[0][1], strict=True))
@@ -357,18 +360,39 @@ def way_of(members, laid, frames, home, shown, curves):
     return Way(walks, shares, at_home, *known, covered, period, tolerance, pauses)
 
 
-def _pauses(laid, shown, curves, places):
-    """Where along the places (L, 2), and how long in s, the demonstrators stood: (P, 2)."""
-    at, seconds, walks = [], [], np.zeros(len(places))
-    for where, covered, each, (_, moments) in zip(laid.at, laid.covered, shown, curves, strict=True):
+def _pauses(laid, shown, curves, places, predicted=None):
+    """Where along the places (L, 2), and how long in s, the demonstrators stood: (P, 2).
+
+    Of several demonstrations it is the place from which all stands are seen best, given where the
+    way has its places in each of them, `predicted` (K, L, 2).
+    """
+    found, walks = [], np.zeros(len(places))
+    for k, (where, covered, each, (_, moments)) in enumerate(
+        zip(laid.at, laid.covered, shown, curves, strict=True)
+    ):
         walks += len(moments) * covered
         inside = np.flatnonzero(covered)
-        for stands, moment in zip(each.stands, moments, strict=True):
+        for j, (stands, moment) in enumerate(zip(each.stands, moments, strict=True)):
             sample = _share_of(stands.walk, moment)[stands.rows]
             there = (sample >= where[inside[0]]) & (sample <= where[inside[-1]])
-            at.append(np.interp(sample[there], *_rising(where[inside], inside)))
-            seconds.append(stands.seconds[there])
-    return pooled_along(at, seconds, places, lambda place: walks[round(place)])
+            at = np.interp(sample, *_rising(where[inside], inside))
+            stood = zip(at.tolist(), stands.seconds.tolist(), stands.walk[stands.rows].tolist(), strict=True)
+            found += [(a, s, (k, j), place) for (a, s, place), of in zip(stood, there, strict=True) if of]
+    pauses = in_common(found, places, lambda place: walks[round(place)])
+    if predicted is not None:
+        pauses = [(_best_seen(group, predicted), seconds) for _, seconds, group in pauses]
+    return np.array(sorted(each[:2] for each in pauses)).reshape(-1, 2)
+
+
+def _best_seen(group, predicted):
+    """Which place, between those where a pause was found, is the least squared distance from all of its stands."""
+    at = [each[0] for each in group]
+    tried = np.linspace(min(at), max(at), FINE)
+    missed = np.zeros(FINE)
+    for _, _, (k, _), place in group:
+        x, y = (np.interp(tried, np.arange(len(column)), column) for column in predicted[k].T)
+        missed += (x - place[0]) ** 2 + (y - place[1]) ** 2
+    return float(tried[np.argmin(missed)])
 
 
 def _rising(values, numbers):
