@@ -17,13 +17,12 @@ from dollop.checks import (
     put_in,
 )
 from dollop.law.line import check_ends, lines_of
+from dollop.law.pauses import on_cuts, shown_pauses
 from dollop.law.timing import (
     CORNER,
     OVER,
     SOONEST,
     Stands,
-    on_cuts,
-    shown_pauses,
     shown_profile,
     times_along,
     turns_at,
@@ -49,7 +48,7 @@ from dollop.trajectory import (
     resample,
 )
 
-__all__ = ["LEAST_REACH", "PERIODS", "SequencedLDS", "check_times"]
+__all__ = ["LEAST_REACH", "LONGEST_PAUSE", "PERIODS", "SequencedLDS", "check_times"]
 
 LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none would ever arrive
 REACH = 0.01  # m, to which lines are rolled out

@@ -1,8 +1,6 @@
-"""When a demonstrator was where: pauses, and the speed along each segment (beyond the paper)."""
+"""When a demonstrator was where: stands, and the speed along each segment (beyond the paper)."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from math import fsum
 
 import numpy as np
 from scipy.ndimage import correlate1d, maximum_filter1d, uniform_filter1d
@@ -17,9 +15,6 @@ __all__ = [
     "SOONEST",
     "Stands",
     "apart_within",
-    "grouped",
-    "on_cuts",
-    "shown_pauses",
     "shown_profile",
     "times_along",
     "turns_at",
@@ -135,7 +130,10 @@ class Stands:
             Of those, and of the stands that the walk has at its ends.
         """
         ends, rows = cls.of(walk, period, "ends"), np.asarray(rows, int)
-        rows, seconds = np.concatenate([ends.rows, ends.number[rows]]), np.concatenate([ends.seconds, seconds])
+        rows, seconds = (
+            np.concatenate([ends.rows, ends.number[rows]]),
+            np.concatenate([ends.seconds, seconds]),
+        )
         inner, order = np.arange(len(rows)) >= len(ends.rows), np.argsort(rows, kind="stable")
         return cls(ends.walk, rows[order], seconds[order], inner[order], ends.number, pooled=True)
 
@@ -262,140 +260,6 @@ def _middle(samples):
         away = np.hypot(*(samples - middle).T)
         middle = samples[away <= np.median(away)].mean(axis=0)
     return middle
-
-
-def shown_pauses(stands, shares, length):
-    """Where and how long the walks stood, pooled.
-
-    Parameters
-    ----------
-    stands : sequence of K Stands
-    shares : (K, C) float array
-        Shares of each walk's way, rising from 0 to 1, at which it may be cut (see `align`).
-    length : float
-        The mean length of the walks, m.
-
-    Returns
-    -------
-    list of (float, float)
-        At which candidate cut, as a fractional number, and the mean pause in s, where at least half
-        of the walks stood; those at the ends of the walks are at the first and the last.
-    """
-    inner, first, last, end = [], [], [], shares.shape[1] - 1.0
-    for k, each in enumerate(stands):
-        way = arc_length(each.walk)
-        at = np.interp(way[each.rows] / way[-1], shares[k], np.arange(end + 1))
-        for where, seconds, of in zip(at.tolist(), each.seconds.tolist(), each.inner.tolist(), strict=True):
-            kind = inner if of else first if where < end / 2 else last
-            kind.append((where, seconds, k))
-    at_ends = (0.0, first), (end, last)
-    ends = [grouped([(at, *each[1:]) for each in kind], lambda _: len(stands), 0, 0) for at, kind in at_ends]
-    if all(each.pooled for each in stands):
-        by_walk = [[each[:2] for each in inner if each[2] == k] for k in range(len(stands))]
-        means = [np.mean(each, axis=0).tolist() for each in zip(*by_walk, strict=True)]
-    else:
-        within, between = apart_within(length) / length * end, SHARE * end
-        means = grouped(inner, lambda _: len(stands), max(within, 2.0), max(between, 2.0))
-    return [tuple(each[:2]) for each in (*ends[0], *means, *ends[1])]
-
-
-def grouped(found, count, within, between):
-    """The pauses that walks have in common.
-
-    Parameters
-    ----------
-    found : list of (float, float, int, ...)
-        Where along the way, how long in s, in which walk somebody stood, and what else is known.
-    count : callable
-        How many walks there are at a place.
-    within, between : float
-        How far apart along the way stands of one walk, and of several, are one pause. Of several
-        walks the nearest are put together first, and never two of one walk.
-
-    Returns
-    -------
-    list of (float, float, list)
-        Where, how long on the mean of all walks, who did not stand counting as 0 s, and what of
-        `found` that is; in order, where at least half of the walks stood.
-
-    Examples
-    --------
-    >>> grouped([(3.0, 2.0, 0), (7.0, 9.0, 0), (3.2, 4.0, 1)], lambda at: 3, 0.5, 1.2)
-    [(3.1, 2.0, [(3.0, 2.0, 0), (3.2, 4.0, 1)])]
-    """
-    pauses = []
-    for group in _together(_of_each_walk(found, within), between):
-        middle, number = fsum(each[0] for each in group) / len(group), len(group)
-        if number >= count(middle) / 2:
-            pauses.append((middle, fsum(each[1] for each in group) / max(count(middle), number), group))
-    return pauses
-
-
-def _of_each_walk(found, within):
-    """The same, in order, where stands of one walk that are so near to the one before are one with it."""
-    single = {}
-    for at, seconds, walk, *more in sorted(found):
-        mine = single.setdefault(walk, [])
-        if mine and at - mine[-1][0] <= within:
-            seconds += mine.pop()[1]
-        mine.append((at, seconds, walk, *more))
-    return sorted(each for mine in single.values() for each in mine)
-
-
-def _together(found, between):
-    """Groups of tuples that are in order, the nearest neighbours first, of one walk at most one in each."""
-    groups = [[each] for each in found]
-    while True:
-        middles = [fsum(each[0] for each in group) / len(group) for group in groups]
-        walks = [{each[2] for each in group} for group in groups]
-        gaps = [
-            (b - a, k) for k, (a, b) in enumerate(pairwise(middles)) if b - a <= between and not walks[k] & walks[k + 1]
-        ]
-        if not gaps:
-            return groups
-        k = min(gaps)[1]
-        groups[k : k + 2] = [groups[k] + groups[k + 1]]
-
-
-def on_cuts(pauses, count):
-    """Cuts for pauses, and where the candidates must be moved to for it.
-
-    A pause that is not at an end has a cut of its own, and two candidates at least on either side of
-    it, of which a segment consists.
-
-    Parameters
-    ----------
-    pauses : sequence of (float, float)
-        At which candidate, as a fractional number, and how long in s; in order.
-    count : int
-        How many candidates there are at equal distances, C.
-
-    Returns
-    -------
-    seconds : dict of int to float
-        By candidate.
-    moved : (C,) float array
-        Where each candidate is to be instead, evenly between the pauses.
-
-    Examples
-    --------
-    >>> seconds, moved = on_cuts([(4.4, 3.0)], 9)
-    >>> seconds, moved
-    ({4: 3.0}, array([0. , 1.1, 2.2, 3.3, 4.4, 5.3, 6.2, 7.1, 8. ]))
-    """
-    last, at = count - 1, np.array([where for where, _ in pauses])
-    inner = np.unique(at[(at > 0) & (at < last)])
-    room = 2 * np.arange(1, len(inner) + 1)
-    cuts = np.maximum.accumulate(np.maximum(np.rint(inner), 2) - room) + room
-    cuts = np.minimum(cuts, last - room[::-1]).astype(int)
-    if cuts.min(initial=2) < 2:  # more pauses than there is room for
-        cuts, moved = np.rint(inner).astype(int), np.arange(count, dtype=float)
-    else:
-        moved = np.interp(np.arange(count), [0, *cuts, last], [0, *inner, last])
-    seconds = {}
-    for cut, (_, each) in zip(np.interp(at, [0, *inner, last], [0, *cuts, last]).round().astype(int).tolist(), pauses, strict=True):
-        seconds[cut] = seconds.get(cut, 0.0) + each
-    return seconds, moved
 
 
 def turns_at(path, ways):

@@ -141,9 +141,11 @@ def shared_pauses(laws, members):
         waited there; 0 at both ends.
     """
     pauses = [each.without_waits_at_ends().pauses for each in laws]
-    waited = [np.array([pauses[d][i + 1] for d, i in shared]) for shared in members[:-1]]
-    means = [each.mean() if np.mean(each > 0) >= 0.5 else 0.0 for each in waited]
-    return np.array([0.0, *means, 0.0])
+    shared = np.zeros(len(members) + 1)
+    for k, along in enumerate(members[:-1], start=1):
+        waited = np.array([pauses[d][i + 1] for d, i in along])
+        shared[k] = waited.mean() if np.mean(waited > 0) >= 0.5 else 0.0
+    return shared
 
 
 def tie_to_objects(environment, demonstrations, centres, members):

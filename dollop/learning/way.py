@@ -21,7 +21,8 @@ from dollop.checks import (
     checked_wholes,
     put_in,
 )
-from dollop.law.timing import SHARE, Stands, apart_within, grouped
+from dollop.law.pauses import Stood, in_common
+from dollop.law.timing import Stands
 from dollop.learning.frames import frames_like
 from dollop.learning.places import Places
 from dollop.learning.ways import PLACES
@@ -29,7 +30,7 @@ from dollop.pose import rotation
 from dollop.sequenced_lds import LEAST_REACH, LONGEST_PAUSE, PERIODS, SequencedLDS, check_times
 from dollop.trajectory import align, arc_length, check_trajectory, resample
 
-__all__ = ["Way", "curve_of", "in_common", "way_of", "which_places"]
+__all__ = ["Way", "curve_of", "way_of", "which_places"]
 
 WEIGHTS, ROUNDING = (-1, 2), 1e-6
 """What a weight can be: smooth ones go a little beyond 0 and 1; and what those of a place may miss 1 by."""
@@ -131,13 +132,14 @@ class Way:
         put_in(self, pauses=pauses)
 
     def _find_pauses(self):
-        """Take what pauses the walks have out of them, and pool them."""
+        """Take what pauses the walks have out of them."""
         stands = [Stands.of(walk, self.sample_period, "inner") for walk in self.walks]
         shares = [each.of_walk(share) for each, share in zip(stands, self.shares, strict=True)]
-        at = [share[each.rows] for each, share in zip(stands, shares, strict=True)]
-        found = [(at, s, k) for k, each in enumerate(zip(at, stands, strict=True)) for at, s in _of_both(*each)]
-        pauses = in_common(found, self.home, lambda place: len(stands))
-        pauses = np.array([each[:2] for each in pauses]).reshape(-1, 2)
+        found = []
+        for k, (each, share) in enumerate(zip(stands, shares, strict=True)):
+            found += map(Stood, share[each.rows].tolist(), each.seconds.tolist(), [k] * len(each.rows))
+        pauses = in_common(found, lambda at: len(stands), arc_length(self.home)[-1], len(self.home) - 1)
+        pauses = np.array([pause[:2] for pause in pauses]).reshape(-1, 2)
         put_in(self, walks=tuple(each.walk for each in stands), shares=tuple(shares), pauses=pauses)
 
     def __repr__(self):
@@ -264,31 +266,6 @@ def _ticks(lasting, stops):
     return np.append(np.concatenate(parts), lasting), counts[:-1].cumsum()
 
 
-def _of_both(at, stands):
-    """Pairs of where and how long."""
-    return zip(at.tolist(), stands.seconds.tolist(), strict=True)
-
-
-def in_common(found, places, count):
-    """The pauses that walks have in common.
-
-    Parameters
-    ----------
-    found, count
-        As for `dollop.law.timing.grouped`, along the places, 0 to L - 1.
-    places : (L, 2) float array
-        In m.
-
-    Returns
-    -------
-    list of (float, float, list)
-        As of `grouped`.
-    """
-    length, last = max(arc_length(places)[-1], LEAST_REACH), len(places) - 1
-    within = apart_within(length) / length * last
-    return grouped(found, count, max(within, 1.0), SHARE * last)
-
-
 def curve_of(walks):
     """The places of a demonstration: `PLACES` at equal distances along the mean of its walks.
 
@@ -367,32 +344,37 @@ def _pauses(laid, shown, curves, places, predicted=None):
     way has its places in each of them, `predicted` (K, L, 2).
     """
     found, walks = [], np.zeros(len(places))
-    for k, (where, covered, each, (_, moments)) in enumerate(
-        zip(laid.at, laid.covered, shown, curves, strict=True)
-    ):
+    for k, (at, covered, each, (_, moments)) in enumerate(zip(laid.at, laid.covered, shown, curves, strict=True)):
         walks += len(moments) * covered
         inside = np.flatnonzero(covered)
         for j, (stands, moment) in enumerate(zip(each.stands, moments, strict=True)):
             sample = _share_of(stands.walk, moment)[stands.rows]
-            there = (sample >= where[inside[0]]) & (sample <= where[inside[-1]])
-            at = np.interp(sample, *_rising(where[inside], inside))
-            stood = zip(at.tolist(), stands.seconds.tolist(), stands.walk[stands.rows].tolist(), strict=True)
-            found += [(a, s, (k, j), place) for (a, s, place), of in zip(stood, there, strict=True) if of]
-    pauses = in_common(found, places, lambda place: walks[round(place)])
+            seen = (sample >= at[inside[0]]) & (sample <= at[inside[-1]])
+            where = np.interp(sample[seen], *_rising(at[inside], inside)).tolist()
+            stood = stands.walk[stands.rows[seen]].tolist()
+            found += map(
+                Stood,
+                where,
+                stands.seconds[seen].tolist(),
+                [(k, j)] * len(where),
+                map(tuple, stood),
+            )
+    pauses = in_common(found, lambda at: walks[round(at)], arc_length(places)[-1], len(places) - 1)
     if predicted is not None:
-        pauses = [(_best_seen(group, predicted), seconds) for _, seconds, group in pauses]
-    return np.array(sorted(each[:2] for each in pauses)).reshape(-1, 2)
+        pauses = sorted((_best_seen(each.stood, predicted), each.seconds) for each in pauses)
+    return np.array([each[:2] for each in pauses]).reshape(-1, 2)
 
 
-def _best_seen(group, predicted):
-    """Which place, between those where a pause was found, is the least squared distance from all of its stands."""
-    at = [each[0] for each in group]
+def _best_seen(stood, predicted):
+    """Which place, between those of some stands, is the least squared distance from all of them."""
+    at = [each.at for each in stood]
     tried = np.linspace(min(at), max(at), FINE)
     missed = np.zeros(FINE)
-    for _, _, (k, _), place in group:
-        x, y = (np.interp(tried, np.arange(len(column)), column) for column in predicted[k].T)
-        missed += (x - place[0]) ** 2 + (y - place[1]) ** 2
-    return float(tried[np.argmin(missed)])
+    for each in stood:
+        way = predicted[each.walk[0]]
+        x, y = (np.interp(tried, np.arange(len(way)), column) for column in way.T)
+        missed += (x - each.place[0]) ** 2 + (y - each.place[1]) ** 2
+    return float(tried[np.argmin(np.nan_to_num(missed, nan=np.inf))])
 
 
 def _rising(values, numbers):
