@@ -62,6 +62,8 @@ class Cut:
         How much of it was dropped before the first lap and after the last, in m.
     doubt : str
         Why a walk that seems to repeat itself was kept whole all the same; empty otherwise.
+    stood : float
+        How long on the mean somebody stood between two laps, s: at their ends, and not on the way.
     """
 
     laps: list
@@ -70,6 +72,7 @@ class Cut:
     before: float = 0.0
     after: float = 0.0
     doubt: str = ""
+    stood: float = 0.0
 
     def __repr__(self):
         return f"Cut of {self.way:.1f} m into {len(self.laps)} laps, {self.dropped:.0%} dropped"
@@ -82,11 +85,17 @@ class Cut:
     @property
     def notes(self):
         """What somebody who uses the laps must know, a tuple of `Note`; on good input none."""
+        told = []
         if self.dropped > DROPPED:
             where = f"{self.before:.1f} m before and {self.after:.1f} m after {len(self.laps)} laps"
-            told = f"{self.dropped:.0%} of the {self.way:.1f} m walked are dropped: {where}"
-            return (Note("laps", f"{told}; more than {DROPPED:.0%} is worth a look"),)
-        return (Note("laps", f"the walk is kept whole: {self.doubt}", False),) if self.doubt else ()
+            text = f"{self.dropped:.0%} of the {self.way:.1f} m walked are dropped: {where}"
+            told.append(Note("laps", f"{text}; more than {DROPPED:.0%} is worth a look"))
+        elif self.doubt:
+            told.append(Note("laps", f"the walk is kept whole: {self.doubt}", False))
+        if self.stood:
+            text = f"between two laps somebody stands for {self.stood:.1f} s on the mean"
+            told.append(Note("laps", f"{text}: laps begin and end there, it is no pause on the way", False))
+        return tuple(told)
 
 
 def laps(t, positions):
@@ -163,11 +172,13 @@ def cut_laps(t, positions):
     [(2, 0.2), (1, 0.0)]
     """
     t, points = even_clock(t, check_trajectory(positions, "positions"))
-    cuts, doubt = lap_cuts(points, where_stood(t, points))
-    walked = way(points)[0]
+    stands, walked = Stands.of(points, t[1] - t[0], "inner"), way(points)[0]
+    at = walked[np.searchsorted(stands.number, stands.rows)]
+    cuts, doubt = lap_cuts(points, at)
+    stood = between(walked[cuts], at, stands.seconds)
     parts = [points[start : end + 1] for start, end in pairwise(cuts)]
     before, after = walked[cuts[0]], walked[-1] - walked[cuts[-1]]
-    return Cut(parts, t[cuts], float(walked[-1]), float(before), float(after), doubt)
+    return Cut(parts, t[cuts], float(walked[-1]), float(before), float(after), doubt, stood)
 
 
 def even_clock(t, points):
@@ -219,23 +230,29 @@ def way(points):
     return walked, np.array(vertices)
 
 
-def where_stood(t, points):
-    """Samples of a track (N, 2) at even times (N,) in s at which somebody pauses on the way."""
-    stands = Stands.of(points, t[1] - t[0], "inner")
-    return np.searchsorted(stands.number, stands.rows)
+def between(begins, at, seconds):
+    """How long on the mean in s somebody stood where laps begin, but for the first and the last place.
+
+    After so many m laps begin and the last ends (K + 1,), and after so many somebody stood (P,), for so many s.
+    """
+    inner = begins[1:-1, None]
+    if not inner.size:
+        return 0.0
+    near = np.abs(at - inner) <= apart_within(np.diff(begins).mean())
+    return float((near * seconds).sum() / len(inner))
 
 
 def lap_cuts(points, stood=()):
     """Samples of a track (N, 2) at which laps begin and the last ends, and why there are none.
 
-    And those where somebody `stood` (P,), which are no good places to cut.
+    Where somebody `stood`, after so many m (P,), is no good place to cut.
     """
     walked, vertices = way(points)
     corners = points[np.append(vertices, len(points) - 1)]
     n = max(len(points), 100)
     track, step, doubt = resample(corners, n), walked[-1] / (n - 1), ""
     for lag in islice(lap_lags(track), TRIALS):
-        cuts = cuts_at(points, walked, corners, lag * step, walked[np.asarray(stood, int)])
+        cuts = cuts_at(points, walked, corners, lag * step, stood)
         fault, after = (
             why_too_few(walked, cuts),
             f"it seems to repeat itself after {lag * step:.1f} m",
