@@ -66,7 +66,7 @@ def in_common(found, count, length, last):
     [(3.1, 2.0)]
     """
     within, between = apart_within(length) / max(length, INSIDE) * last, SHARE * last
-    groups = _together(_of_each_walk(found, max(within, 1.0)), max(between, 1.0))
+    groups = _together(_of_each_walk(found, within), between)
     pauses = [_mean_of(group, max(count(_middle_of(group)), len(group))) for group in groups]
     return [pause for pause in pauses if len(pause.stood) >= count(pause.at) / 2]
 

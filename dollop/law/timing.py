@@ -28,6 +28,8 @@ which no sample period is known, is not taken for a pause."""
 QUIET, NOISY = 0.01, 0.03
 """m: scatter of the samples along each axis that is small beside `STILL`, and the most that is allowed for:
 a laser's track of somebody who stands scatters by 0.5 cm, and by some centimetres where it is seen badly."""
+GONE = 0.2
+"""m: who has not been so far away between two stands has not gone; it is less than the length of a foot."""
 CREEP = 1e-3
 """m: two samples of a place are no nearer to each other."""
 ROUNDS = 3
@@ -192,7 +194,7 @@ def apart_within(length):
 
 def _spans(walk, period):
     """Spans (first, last) of samples in which somebody stands."""
-    spans = [_narrowed(walk, *span, _width(period)) for span in _still(walk, period)]
+    spans = [_narrowed(walk, *span, _width(period)) for span in _unbroken(walk, _still(walk, period))]
     return [(a, b) for a, b in spans if (b - a) * period >= LEAST]
 
 
@@ -221,6 +223,20 @@ def _still(walk, period):
     still = maximum_filter1d(middle.astype(np.int8), width, mode="constant", origin=origin)
     edges = np.flatnonzero(np.diff(still, prepend=0, append=0))
     return list(zip(edges[::2], edges[1::2] - 1, strict=True))
+
+
+def _unbroken(walk, spans):
+    """Spans in order, where those are one between which nobody has gone."""
+    joined = []
+    for first, last in spans:
+        before = joined[-1] if joined else (first, last)
+        places = [walk[a : b + 1].mean(axis=0) for a, b in (before, (first, last))]
+        between = walk[before[1] : first + 1]
+        gone = max(np.hypot(*(between - place).T).max(initial=0) for place in places)
+        if joined and gone <= GONE:
+            first = joined.pop()[0]
+        joined.append((first, last))
+    return joined
 
 
 def _noise(walk):
