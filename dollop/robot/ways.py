@@ -405,7 +405,7 @@ class WayKeeper:
         return ""
 
     def look_closer(self):
-        """Map what is known to stand there by finer cells, between which narrower ways are found.
+        """Map what is known to stand there by finer cells, between which narrower ways lead straighter.
 
         Returns
         -------
@@ -468,7 +468,7 @@ class WayKeeper:
             self.supervisor.elapsed, self.supervisor.standing = elapsed, standing
             command = self.supervisor.command(x, y, theta)
         here = self.ways[self.way]
-        if self.hopeless and self.closed(here, self.active, x, y) and self.look_closer():
+        if self.hopeless and self.look_closer():
             self.enter(here, self.active)
         return command, self.supervisor.most
 
