@@ -1,7 +1,7 @@
 """How robots of any size perform tasks in rooms drawn at random: python -m benchmarks.driving
 
     python -m benchmarks.driving [--radius 0.18 0.25 0.40] [--first 0] [--count 100] [--control pursuit|plain]
-        [--workers 2] [--out TABLE.csv] [--pictures FOLDER]
+        [--workers 2] [--out TABLE.csv] [--pictures FOLDER] [--pybullet]
 
 A room, a walk of a person through it, the task that `dollop.learn` makes of it, at times adapted to moved objects, and
 a robot of each radius with limits and a control period of its own that begins near the start at any heading, and is
@@ -35,6 +35,8 @@ MARGINS = 0.0, 0.02, 0.05, 0.067
 """m."""
 REACH, NEAR = 0.25, 0.3
 """m: within which a segment hands over, and within which a robot was at a subgoal."""
+GROUPS = ("radius",)
+"""Columns by which runs are told apart."""
 FAR = 0.5
 """m: beyond it a clearance tells nothing."""
 
@@ -214,12 +216,12 @@ def of_radius(radius, part):
     return line | {"periods": int(ran.periods.sum())}
 
 
-def reasons(table):
-    """How often each reason was given, by radius and whether a way exists."""
+def reasons(table, groups=GROUPS):
+    """How often each reason was given, by some columns and whether a way exists."""
     told = table[table.outcome != "finished"].copy()
     told["reason"] = told.reason.fillna("").str.replace(r"-?\d+(\.\d+)?", "#", regex=True)
     told["way"] = told.margin >= 0
-    return told.groupby(["radius", "way", "outcome", "reason"]).size()
+    return told.groupby([*groups, "way", "outcome", "reason"]).size()
 
 
 def picture(room, task, row, run, radius, path):
@@ -273,28 +275,41 @@ def parsed(arguments=None):
     parser = argparse.ArgumentParser(prog="python -m benchmarks.driving", description=__doc__.split("\n")[0])
     parser.add_argument("--radius", type=float, nargs="+", default=[0.18, 0.25, 0.40], help="in m")
     parser.add_argument("--first", type=int, default=0, help="seed")
-    parser.add_argument("--count", type=int, default=100, help="of seeds")
+    parser.add_argument("--count", type=int, help="of seeds, default: 100, and 30 with --pybullet")
     parser.add_argument("--control", default="pursuit", choices=["pursuit", "plain"])
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", help="table as CSV")
     parser.add_argument("--pictures", help="folder for pictures of the failures")
+    parser.add_argument("--pybullet", action="store_true", help="the Pioneer, see benchmarks.driving_lab; 30 rooms")
     return parser.parse_args(arguments)
 
 
 def main(arguments=None):
     options = parsed(arguments)
+    if options.pybullet:
+        from benchmarks import driving_lab as course
+
+        jobs = [joblib.delayed(course.rows_of)(seed) for seed in seeds_of(options, 30)]
+    else:
+        from benchmarks import driving as course
+
+        more = options.radius, options.control, options.pictures
+        jobs = [joblib.delayed(course.rows_of)(seed, *more) for seed in seeds_of(options, 100)]
     if options.pictures:
         Path(options.pictures).mkdir(parents=True, exist_ok=True)
-    seeds = range(options.first, options.first + options.count)
-    asked = (joblib.delayed(rows_of)(seed, options.radius, options.control, options.pictures) for seed in seeds)
-    rows = joblib.Parallel(options.workers)(asked)
-    table = pd.DataFrame([row for part in rows for row in part])
+    parts = joblib.Parallel(options.workers)(jobs)
+    table = pd.DataFrame([row for part in parts for row in part])
     if options.out:
         table.to_csv(options.out, index=False)
-    if options.pictures:
+    if options.pictures and not options.pybullet:
         write_failures(table, options.pictures)
-    print(summary(table).to_string(index=False))
-    print(reasons(table).to_string())
+    print(course.summary(table).to_string(index=False))
+    print(reasons(table, course.GROUPS).to_string())
+
+
+def seeds_of(options, count):
+    """The seeds that are asked for."""
+    return range(options.first, options.first + (options.count or count))
 
 
 if __name__ == "__main__":
