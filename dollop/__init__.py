@@ -68,7 +68,7 @@ from dollop.laser import LaserLog
 from dollop.lds import LDS
 from dollop.matching import Matching, match
 from dollop.observation import Observation, Observer, observe
-from dollop.robot import Run, Unicycle, localise, perform
+from dollop.robot import Controller, Run, Unicycle, localise, perform
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
 from dollop.tracking import Motion, Track, Tracker
@@ -76,7 +76,7 @@ from dollop.tracking import Motion, Track, Tracker
 __version__ = "0.1.0"
 
 __all__ = [
-    "LDS", "Association", "Demonstration", "Environment", "FormatError", "Frames", "LaserLog",
+    "LDS", "Association", "Controller", "Demonstration", "Environment", "FormatError", "Frames", "LaserLog",
     "Matching", "Motion", "Note", "Observation", "Observer", "OccupancyGrid", "Run", "SequencedLDS", "SubgoalHMM",
     "Task", "Track", "Tracker", "Unicycle", "__version__", "associate", "associate_with_frames",
     "laps", "learn", "localise", "match", "observe", "perform", "read_log", "write_log",

@@ -21,28 +21,78 @@ from math import cos, hypot, inf, sin, sqrt
 import numpy as np
 import scipy
 
-from dollop.gridmap import covered_cells, distances_to, in_cells, in_metres
+from dollop.checks import FARTHEST, checked_number, put_in
+from dollop.gridmap import distances_to, in_cells, in_metres
 
-__all__ = ["FREE_BELOW", "INFLUENCE", "KEPT", "Geodesic", "ObstacleMap", "towards"]
+__all__ = [
+    "PIONEER_AVOIDANCE",
+    "FREE_BELOW",
+    "PIONEER_RADIUS",
+    "Avoidance",
+    "Geodesic",
+    "ObstacleMap",
+    "towards",
+]
 
-ROBOT_RADIUS = 0.25
+PIONEER_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
-KEPT, INFLUENCE = 0.20, 0.50
-"""Distances in m between the robot's edge and an obstacle: what the modulation keeps, and where it
-sets in."""
-TIGHT = KEPT / 3
-"""Distance in m between the robot's edge and an obstacle that the shortest ways keep."""
 FREE_BELOW = 0.2
 """Occupancy below which a cell is free: most beams miss a stool's thin column in its cell."""
-CROWDING = 4.0
-"""How many times longer a metre counts for the geodesic where the robot would touch something."""
 OPEN_BORDER = 3.0
-"""Border in m of a world without a map round all that is in it."""
+"""Border in m of a world without a map round all that is in it, beside the robot's diameter."""
 MOST_CELLS, COARSEST = 3_000_000, 0.5
 """Cells of a map at most, of 300 bytes each where a shortest way is looked for; and their side in m
 at most."""
 AHEAD = 6
 """Cells of a shortest way over which its direction is taken: one alone knows eight directions."""
+
+
+@dataclass(frozen=True)
+class Avoidance:
+    """How far a robot keeps off what stands there, all from its edge (beyond the paper).
+
+    Attributes
+    ----------
+    kept : float
+        Distance in m that the modulation keeps.
+    influence : float
+        Distance in m at which it sets in.
+    tight : float
+        Distance in m that the shortest ways keep: a cell of most maps, for no map is more exact.
+        What is narrower is no way.
+    crowding : float
+        How many times longer, less one, a metre counts for the shortest ways where the robot would
+        touch something.
+
+    Raises
+    ------
+    ValueError
+        For what is no number, or not in the order 0 < tight <= kept < influence.
+
+    Examples
+    --------
+    >>> Avoidance(kept=0.6)
+    Traceback (most recent call last):
+    ValueError: distances must be 0 < tight <= kept < influence, got 0.05, 0.6 and 0.5
+    """
+
+    kept: float = 0.20
+    influence: float = 0.50
+    tight: float = 0.05
+    crowding: float = 4.0
+
+    def __post_init__(self):
+        put_in(
+            self,
+            **{name: checked_number(name, getattr(self, name), 0, FARTHEST) for name in self.__match_args__},
+        )
+        if not 0 < self.tight <= self.kept < self.influence:
+            got = f"got {self.tight:g}, {self.kept:g} and {self.influence:g}"
+            raise ValueError(f"distances must be 0 < tight <= kept < influence, {got}")
+
+
+PIONEER_AVOIDANCE = Avoidance()
+"""As measured with a Pioneer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +111,8 @@ class ObstacleMap:
         Side of a cell in m.
     radius : float
         The robot's in m.
+    rules : Avoidance
+        How far the robot keeps off.
 
     Examples
     --------
@@ -75,7 +127,8 @@ class ObstacleMap:
     distances: np.ndarray
     origin: tuple
     resolution: float
-    radius: float = ROBOT_RADIUS
+    radius: float = PIONEER_RADIUS
+    rules: Avoidance = PIONEER_AVOIDANCE
 
     def __post_init__(self):
         if min(np.shape(self.distances), default=0) < 2 or np.ndim(self.distances) != 2:
@@ -92,12 +145,22 @@ class ObstacleMap:
         return f"ObstacleMap of {columns} x {rows} cells for a robot of {self.radius:g} m"
 
     @classmethod
-    def of(cls, environment, background=None, places=(), radius=ROBOT_RADIUS, resolution=0.05):
+    def of(
+        cls,
+        environment,
+        background=None,
+        places=(),
+        radius=PIONEER_RADIUS,
+        resolution=0.05,
+        rules=PIONEER_AVOIDANCE,
+    ):
         """The obstacles of an environment before a background (reconstruction).
 
+        Distances to boxes are exact, those to a background are to the squares of its cells.
+
         A map of more than three million cells, 86 m x 86 m at 5 cm, is made of larger ones: without
-        a background of about so many, with one of squares of its cells. What reaches into a cell
-        fills it, and half a cell more is taken off every distance, so that there is never less room
+        a background of about so many, with one of squares of its cells. What reaches into a square
+        fills it, and half a square more is taken off every distance, so that there is never less room
         than there seems to be. Along a square of 200 m cells have 12 cm.
 
         Parameters
@@ -113,6 +176,7 @@ class ObstacleMap:
             The robot's in m.
         resolution : float
             Without a background: side of a cell in m.
+        rules : Avoidance
 
         Returns
         -------
@@ -132,16 +196,26 @@ class ObstacleMap:
         True
         """
         if background is None:
-            origin, side, shape = open_frame(environment.boxes, places, resolution)
+            origin, side, shape = open_frame(
+                environment.boxes,
+                places,
+                resolution,
+                OPEN_BORDER + max(2 * (radius - PIONEER_RADIUS), 0.0),
+            )
             blocked = np.zeros(shape, dtype=bool)
         else:
             blocked, side = coarser(blocked_by(background), background.resolution)
             origin, resolution = background.origin, background.resolution
-        blocked |= covered_cells(environment.boxes, origin, side, blocked.shape)
         distances = signed_distance(blocked, side)
+        columns, rows = (np.arange(size) + 0.5 for size in blocked.shape[::-1])
+        np.minimum(
+            distances,
+            box_distances(environment.boxes, *in_metres(columns, rows, origin, side)),
+            out=distances,
+        )
         if side > resolution:
             distances -= side / 2
-        return cls(distances, origin, side, radius)
+        return cls(distances, origin, side, radius, rules)
 
     def edge(self, x, y):
         """Distance between the edge of the robot and the nearest obstacle.
@@ -189,7 +263,7 @@ class ObstacleMap:
         -------
         bool
         """
-        return self.edge((x + ahead_x) / 2, (y + ahead_y) / 2) <= TIGHT
+        return self.edge((x + ahead_x) / 2, (y + ahead_y) / 2) <= self.rules.tight
 
     def edges(self, positions):
         """`edge` for many places at once.
@@ -252,11 +326,12 @@ class ObstacleMap:
         edge, nx, ny = self._edge_and_slope(x, y)
         outwards = nx * ux + ny * uy
         length = nx * nx + ny * ny
-        if edge >= INFLUENCE or outwards >= 0 or length < 1e-6:  # no slope half-way between two
+        kept, influence = self.rules.kept, self.rules.influence
+        if edge >= influence or outwards >= 0 or length < 1e-6:  # no slope half-way between two
             return ux, uy
         along = outwards / length
         normal_x, normal_y = along * nx, along * ny
-        share = (INFLUENCE - edge) / (INFLUENCE - KEPT)  # 1 / Gamma
+        share = (influence - edge) / (influence - kept)  # 1 / Gamma
         turned_x = (1 - share) * normal_x + (1 + share) * (ux - normal_x)
         turned_y = (1 - share) * normal_y + (1 + share) * (uy - normal_y)
         size = hypot(turned_x, turned_y)
@@ -289,7 +364,7 @@ class ObstacleMap:
     @cached_property
     def _passable(self):
         """(H, W) bool array: cells where the robot touches nothing, with some room to spare."""
-        return self.distances - self.radius > TIGHT
+        return self.distances - self.radius > self.rules.tight
 
     @cached_property
     def _nearest_passable(self):
@@ -299,12 +374,109 @@ class ObstacleMap:
         return memoryview((row * self.distances.shape[1] + column).ravel())
 
     @cached_property
+    def _regions(self):
+        """(H, W) int array: which passable cells hang together, side by side or corner to corner; else 0."""
+        return _regions(self._passable)
+
+    def no_way(self, place, goal, reach):
+        """Why a robot cannot go from a place to within reach of a goal (reconstruction).
+
+        Parameters
+        ----------
+        place, goal : (2,) sequences of float
+            In m.
+        reach : float
+            In m.
+
+        Returns
+        -------
+        str
+            With {} for the name of the goal; empty if there is a way.
+
+        Examples
+        --------
+        >>> from dollop.environment import Environment
+        >>> walls = Environment([[0, 0, 0.2, 3], [0, 3.7, 0.2, 9]])
+        >>> print(ObstacleMap.of(walls, places=[[-1, 3], [1, 3]], radius=0.2).no_way((-1, 3), (1, 3), 0.25))
+        <BLANKLINE>
+        """
+        here = self._regions.ravel()[self._cell(*place)] if self._passable.any() else 0
+        there = self._near(goal, reach)
+        if here and (self._regions[there] == here).any():
+            return ""
+        robot = f"a robot of {self.radius:g} m radius that keeps {self.rules.tight:g} m"
+        if not self._passable[there].any():
+            return f"there is no room for {robot} within {reach:g} m of {{}}"
+        widest = self._widest(place, there)
+        fits = f"the largest that gets there has {widest:.2f} m" if widest >= 0.01 else "none gets there, however small"
+        return f"there is no way to {{}} for {robot}: {fits}"
+
+    def check_free(self, places):
+        """Refuse a place that is off the map, or in an obstacle.
+
+        Parameters
+        ----------
+        places : sequence of (str, sequence of float)
+            Names, and x and y in m, whatever comes after.
+
+        Raises
+        ------
+        ValueError
+            With its name.
+        """
+        for name, (x, y, *_) in places:
+            there = f"got ({x:.2f}, {y:.2f}), which is"
+            if not self.holds(x, y):
+                raise ValueError(f"{name} must lie in the lab, {there} off the map")
+            if self.edge(x, y) <= -self.radius:
+                raise ValueError(f"{name} must be free, {there} in an obstacle or unknown")
+
+    def check_room(self):
+        """Refuse a map on which there is no room for the robot anywhere.
+
+        Raises
+        ------
+        ValueError
+            With its radius.
+        """
+        if not self._passable.any():
+            most = max(float(self.distances.max()) - self.rules.tight, 0.0)
+            rule = f"there must be room for the robot on the map, which has some for a radius of {most:.2f} m"
+            raise ValueError(f"{rule} that keeps {self.rules.tight:g} m, got a radius of {self.radius:g} m")
+
+    def _near(self, place, reach):
+        """Index of the cells, (rows, columns), whose centres are within reach in m of a place; at least its own."""
+        rows, columns = self.distances.shape
+        across, up = in_cells(*place, self.origin, self.resolution)
+        column, row = (min(max(int(at), 0), size - 1) for at, size in ((across, columns), (up, rows)))
+        far = int(reach / self.resolution) + 1
+        y, x = np.ogrid[max(row - far, 0) : row + far + 1, max(column - far, 0) : column + far + 1]
+        y, x = y[y[:, 0] < rows], x[:, x[0] < columns]
+        near = np.hypot(x + 0.5 - across, y + 0.5 - up) * self.resolution <= reach
+        near |= (y == row) & (x == column)
+        found_y, found_x = np.nonzero(near)
+        return found_y + y[0, 0], found_x + x[0, 0]
+
+    def _widest(self, place, there):
+        """Radius in m, to a centimetre, of the largest robot that gets from a place to one of some cells."""
+        across, up = in_cells(*place, self.origin, self.resolution)
+        rows, columns = self.distances.shape
+        here = min(max(int(up), 0), rows - 1), min(max(int(across), 0), columns - 1)
+        low, high = 0.0, self.radius
+        while high - low > 0.005:
+            middle = (low + high) / 2
+            regions = _regions(self.distances - self.rules.tight > middle)
+            through = regions[here] and (regions[there] == regions[here]).any()
+            low, high = (middle, high) if through else (low, middle)
+        return low
+
+    @cached_property
     def _neighbours(self):
         """Sparse (H W, H W) costs in m between passable cells side by side or corner to corner."""
         rows, columns = self.distances.shape
         index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
-        room = np.clip((self.distances - self.radius) / INFLUENCE, 0.0, 1.0)
-        cost = self.resolution * (1 + CROWDING * (1 - room))
+        room = np.clip((self.distances - self.radius) / self.rules.influence, 0.0, 1.0)
+        cost = self.resolution * (1 + self.rules.crowding * (1 - room))
         steps = []
         for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
             here = np.s_[: rows - down, max(-right, 0) : columns - max(right, 0)]
@@ -320,6 +492,8 @@ class ObstacleMap:
         rows, columns = self.distances.shape
         across, up = in_cells(x, y, self.origin, self.resolution)
         column, row = min(max(int(across), 0), columns - 1), min(max(int(up), 0), rows - 1)
+        if self._passable[row, column]:
+            return row * columns + column
         return self._nearest_passable[row * columns + column]
 
     def _centre(self, cell):
@@ -384,7 +558,7 @@ class Geodesic:
         if self._distances[cell] == inf:
             return 0.0, 0.0
         edge, nx, ny = self.obstacles._edge_and_slope(x, y)
-        if edge <= TIGHT:  # first to where there is room, and outwards
+        if edge <= self.obstacles.rules.tight:  # first to where there is room, and outwards
             ux, uy = towards(*self.obstacles._centre(cell), x, y)
             nx, ny = towards(nx, ny)
             return towards(ux + nx, uy + ny)
@@ -420,12 +594,17 @@ def towards(x, y, from_x=0.0, from_y=0.0):
     return (x / size, y / size) if size > 1e-12 else (0.0, 0.0)
 
 
-def open_frame(boxes, places, resolution):
-    """Lower left corner, cells' side and shape of a map that holds boxes (N, 4), places (M, 2) in m."""
+def _regions(passable):
+    """Which of cells (H, W) hang together, side by side or corner to corner: a number from 1 on, else 0."""
+    return scipy.ndimage.label(passable, np.ones((3, 3)))[0]
+
+
+def open_frame(boxes, places, resolution, border):
+    """Lower left corner, cells' side and shape of a map that holds boxes (N, 4), places (M, 2), and a border in m."""
     points = np.vstack([boxes.reshape(-1, 2), np.reshape(places, (-1, 2))])
     if not len(points):
         points = np.zeros((1, 2))
-    low, high = points.min(axis=0) - OPEN_BORDER, points.max(axis=0) + OPEN_BORDER
+    low, high = points.min(axis=0) - border, points.max(axis=0) + border
     side = max(resolution, float(np.sqrt(np.prod(high - low) / MOST_CELLS)))
     if not side <= max(COARSEST, resolution):
         rule = f"{MOST_CELLS} cells of {COARSEST:g} m must hold all places and objects"
@@ -450,6 +629,20 @@ def coarser(blocked, side):
     whole = np.pad(blocked, [(0, -size % times) for size in blocked.shape], constant_values=True)
     rows, columns = np.array(whole.shape) // times
     return whole.reshape(rows, times, columns, times).any(axis=(1, 3)), times * side
+
+
+def box_distances(boxes, x, y):
+    """Distances (H, W) in m from places, columns at x (W,) and rows at y (H,) in m, to the nearest of boxes (N, 4).
+
+    Negative inside.
+    """
+    squared, depth = np.full((len(y), len(x)), np.inf), np.zeros((len(y), len(x)))
+    for left, low, right, high in boxes:
+        across, up = np.maximum(left - x, x - right), np.maximum(low - y, y - high)
+        np.minimum(squared, np.add.outer(np.maximum(up, 0) ** 2, np.maximum(across, 0) ** 2), out=squared)
+        inside = np.ix_(up < 0, across < 0)
+        depth[inside] = np.minimum(depth[inside], np.maximum.outer(up[up < 0], across[across < 0]))
+    return np.where(depth < 0, depth, np.sqrt(squared))
 
 
 def signed_distance(blocked, resolution):

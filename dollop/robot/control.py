@@ -21,11 +21,12 @@ The paper gives neither the rule of handing over nor a controller: both are reco
 """
 
 from collections import namedtuple
-from math import atan2, cos, dist, inf, sin
+from dataclasses import dataclass
+from math import atan2, copysign, cos, dist, inf, pi, sin, sqrt
 
 import numpy as np
 
-from dollop.checks import checked_number
+from dollop.checks import checked_number, put_in
 from dollop.law.line import Fading
 from dollop.lds import MOST_STEPS
 from dollop.pose import wrapped
@@ -33,43 +34,92 @@ from dollop.robot.avoidance import Geodesic, towards
 
 __all__ = [
     "CONTROL_LAWS",
-    "PATIENCE",
+    "PIONEER_FOLLOWING",
     "PIONEER_LIMITS",
-    "REACH",
     "STEP",
+    "Following",
     "Guidance",
     "Limits",
     "clip",
 ]
 
-REACH = 0.25
-"""Distance in m from its subgoal at which a segment hands over: a robot that needs 0.6 m to turn
-would circle nearer ones."""
-PATIENCE = 8.0
-"""Time in s without progress after which the way is changed or the speed halved; turning round
-takes half of it."""
-STEP, LOOK_AHEAD = 0.05, 7
-"""Distance in m between the places of a response that is pursued, and how many of them ahead the
-pursued one is: 0.35 m."""
-STRAY, JUMP = 0.3, 0.3
-"""Distances in m: from its response, at which it is rolled out anew from where the robot is; and in
-one control period, that no robot drives: it has been kidnapped."""
+STEP = 0.05
+"""Distance in m between the places of a response that is pursued."""
 FARTHEST, LONGEST = 100.0, 10_000.0
 """Lengths in m after which a response that has not come to its subgoal is given up: so far, or three
 times as far as it is to the segment's line and along it; and in any case."""
-LEAST_SPEED = 0.1
-"""Speed in m/s that a segment is driven at even where the user hardly moved."""
-SHARP = 1.2
-"""Angle in rad from which a robot turns first and drives then."""
-TURN_GAIN = 3.0
-"""Turning rate in rad/s per rad of heading error: the error fades within a third of a second, about
-as fast as the robot's turning acceleration allows. On a bend the heading lags by turning rate /
-gain, and that is most of the plain law's distance: over twelve laws 78 mm on average with 2, 45 mm
-with 3."""
 AT_ONCE = 1_000_000
 """Pairs of places that are compared at once."""
-SLOWEST = 1 / 16
-"""Share of the demonstrated speed below which a robot that makes no progress gives up."""
+OVER = 0.1
+"""Way in m over which the direction is taken in which a law leaves its start or comes to a subgoal."""
+FACING = 0.1
+"""Angle in rad within which a robot that stands looks where it should."""
+ARRIVING = 0.05
+"""Speed in m/s at which a response passes the place where it ends or waits: a robot creeps up to it."""
+
+
+@dataclass(frozen=True)
+class Following:
+    """How a robot follows the law of a task (reconstruction); made for one of a Pioneer's size.
+
+    Attributes
+    ----------
+    reach : float
+        Distance in m from its subgoal at which a segment hands over: a robot that needs 0.6 m to
+        turn would circle nearer ones.
+    look_ahead : float
+        How far ahead in m the pursued place is.
+    stray : float
+        Distance in m from its response at which it is rolled out anew from where the robot is.
+    jump : float
+        Distance in m that no robot drives in one control period, or twice what it can drive, where
+        that is more: it has been kidnapped.
+    patience : float
+        Time in s without progress after which the way is changed or the speed halved; turning round
+        takes half of it.
+    least_speed : float
+        Speed in m/s that a segment is driven at even where the user hardly moved.
+    sharp : float
+        Angle in rad from which a robot turns first and drives then.
+    turn_gain : float
+        Turning rate in rad/s per rad of heading error, at most one over the control period: the
+        error fades within a third of a second, about as fast as a Pioneer's turning acceleration
+        allows. On a bend the heading lags by turning rate / gain, and that is most of the plain
+        law's distance: over twelve laws 78 mm on average with 2, 45 mm with 3.
+    slowest : float
+        Share of the demonstrated speed below which a robot that makes no progress gives up.
+
+    Raises
+    ------
+    ValueError
+        For what is not a positive number.
+
+    Examples
+    --------
+    >>> Following(patience=0.0)
+    Traceback (most recent call last):
+    ValueError: patience must be in 1e-06 to 1e+06, got 0.0
+    """
+
+    reach: float = 0.25
+    look_ahead: float = 0.35
+    stray: float = 0.3
+    jump: float = 0.3
+    patience: float = 8.0
+    least_speed: float = 0.1
+    sharp: float = 1.2
+    turn_gain: float = 3.0
+    slowest: float = 1 / 16
+
+    def __post_init__(self):
+        put_in(
+            self,
+            **{name: checked_number(name, getattr(self, name), 1e-6, 1e6) for name in self.__match_args__},
+        )
+
+
+PIONEER_FOLLOWING = Following()
+"""As measured with a Pioneer."""
 
 
 class Limits(namedtuple("Limits", "speed turn acceleration turn_acceleration")):
@@ -145,11 +195,17 @@ class Guidance:
     law : SequencedLDS
     obstacles : ObstacleMap, optional
         What to go round; the paper's law goes round nothing.
+    rules : Following
 
     Attributes
     ----------
     goals : list of (float, float)
         Subgoal of each segment in m.
+    lines : list of Line
+        What each segment keeps to.
+    pauses, headings : (K + 1,) sequences of float
+        How long the demonstrator stood at the start and at each subgoal in s, and the directions in
+        rad in which the law leaves the one and comes to the others.
     detours : dict
         For a segment whose response does not get through: the `Geodesic` to its subgoal that is
         followed instead, or, without obstacles, None for the straight line.
@@ -165,12 +221,14 @@ class Guidance:
     True
     """
 
-    def __init__(self, law, obstacles=None):
+    def __init__(self, law, obstacles=None, rules=PIONEER_FOLLOWING):
         self.obstacles = obstacles
+        self._enough = max(rules.reach, obstacles.radius if obstacles else 0.0)
         self.goals = [tuple(segment.goal.tolist()) for segment in law.segments]
         self._steps = [(segment.A - np.eye(2)).ravel().tolist() for segment in law.segments]
-        self._lines = law.lines(STEP / 2)
+        self.lines = law.lines(STEP / 2)
         self.pauses = [0.0] * (len(self.goals) + 1) if law.pauses is None else law.pauses.tolist()
+        self.headings = headings_of(self.lines)
         self._relative = None if law.profile is None else law.profile / np.asarray(law.speeds)[:, None]
         self._weights = [lyapunov_weights(segment.A) for segment in law.segments]
         self.detours, self._geodesics = {}, {}
@@ -241,6 +299,9 @@ class Guidance:
     def reached(self, k, x, y, reach):
         """Whether a robot is within reach of a subgoal, or of where the detour to it ends.
 
+        Such an end counts where the robot stands over the subgoal, or at the distance in which a
+        segment hands over.
+
         Parameters
         ----------
         k : int
@@ -255,8 +316,10 @@ class Guidance:
         bool
         """
         here, detour = (x, y), self.detours.get(k)
-        at_end = detour is not None and dist(detour.goal, here) < reach
-        return at_end or dist(self.goals[k], here) < reach
+        if dist(self.goals[k], here) < reach:
+            return True
+        near = detour is not None and dist(detour.goal, self.goals[k]) <= self._enough
+        return near and dist(detour.goal, here) < reach
 
     def shown_pace(self, k, places):
         """The speed that was shown at places of a segment, as a share of its mean.
@@ -275,7 +338,7 @@ class Guidance:
         places = np.asarray(places, float)
         if self._relative is None:
             return np.ones(len(places))
-        line, along = self._lines[k], self._relative[k]
+        line, along = self.lines[k], self._relative[k]
         parts = np.array_split(places, 1 + len(places) * len(line.places) // AT_ONCE)
         squared = (((part[:, None] - line.places) ** 2).sum(axis=2) for part in parts)
         nearest = np.concatenate([each.argmin(axis=1) for each in squared])
@@ -287,7 +350,7 @@ class Guidance:
 
         It is beside place `at` of the segment's line; by default beside the nearest.
         """
-        places, line = [], Held(self._lines[k], x, y, at)
+        places, line = [], Held(self.lines[k], x, y, at)
         for _ in range(round(line.farthest / STEP)):
             if self.reached(k, x, y, STEP):
                 return places, True
@@ -374,6 +437,15 @@ class Held:
         return self.state
 
 
+def headings_of(lines):
+    """Directions (K + 1) in rad in which the lines of K segments leave the start and come to each subgoal."""
+    leaving = (
+        lines[0].places[np.searchsorted(lines[0].way, OVER, side="right") - len(lines[0].way)] - lines[0].places[0]
+    )
+    arriving = [line.places[-1] - line.places[np.searchsorted(line.way, line.way[-1] - OVER)] for line in lines]
+    return [atan2(y, x) for x, y in (leaving, *arriving)]
+
+
 def lyapunov_weights(A):
     """p, q, r of the P = [[p, q], [q, r]] that solves A^T P A - P = -I."""
     return np.linalg.solve(np.eye(4) - np.kron(A.T, A.T), [1, 0, 0, 1])[[0, 1, 3]].tolist()
@@ -390,28 +462,51 @@ class Supervisor:
     robot : Unicycle, or another
         Its limits, period and pose.
 
+    rules : Following
+
     Attributes
     ----------
     active : int
         The segment in force.
     done : bool
-        Whether the last one has handed over.
+        Whether the last one has handed over, and the robot has waited there.
     hopeless : bool
         Whether there is no progress, however slow the robot.
-    waiting : float
-        Time in s that the robot is still to stand at a subgoal, as the demonstrator did.
+    waits : list of [int, float]
+        Where the robot is still to stand, 0 being the start and k the k-th subgoal, and for how
+        long in s, as the demonstrator did.
+    stood : dict of int to float
+        How long in s it has stood there.
     pace : float
         Share of the demonstrated speed. It is halved when there is no progress: the slower a robot,
         the more exactly it can follow the direction of the law, whose Lyapunov measure falls
         everywhere, and so every segment hands over.
+    elapsed : float
+        Time in s since the last command.
+    standing : bool
+        Whether the robot has been told to stand.
+    most : float
+        Speed in m/s from which it can still brake in time.
     """
 
-    def __init__(self, guidance, speeds, robot):
-        self.guidance, self.limits, self.period = guidance, robot.limits, robot.period
+    def __init__(self, guidance, speeds, robot, rules=PIONEER_FOLLOWING):
+        self.guidance, self.limits, self.rules = guidance, robot.limits, rules
+        self.period = self.elapsed = robot.period
         self.speeds = [float(speed) for speed in speeds]
-        self.active, self.done, self.hopeless, self.waiting = 0, False, False, 0.0
-        self.last = robot.pose[:2]
+        self.active, self.handed_over, self.hopeless, self.standing = 0, False, False, True
+        self.waits, self.stood = [], {}
+        self.fastest = min(self.limits.speed, rules.look_ahead / (2 * self.period))
+        self.gain = min(rules.turn_gain, 1 / self.period)
+        self.patience = max(rules.patience, 2 * pi / self.limits.turn, 4 * STEP / self.limits.speed)
+        self.jump = max(rules.jump, 2 * self.limits.speed * self.period)
+        self.last, self.most = None, inf
+        self.expect_to_wait(0)
         self.restart()
+
+    @property
+    def done(self):
+        """Bool: see the attributes."""
+        return self.handed_over and not self.waits
 
     def restart(self):
         """Begin the segment in force: at its full pace, without a detour, and with new patience."""
@@ -420,16 +515,18 @@ class Supervisor:
 
     def notice_kidnapping(self, x, y):
         """Begin the segment in force afresh where the robot finds itself elsewhere."""
-        if dist(self.last, (x, y)) > JUMP:
+        if self.last and dist(self.last, (x, y)) > self.jump:
+            if self.waits and self.waits[0][0]:  # carried off while it stood: back there
+                self.active, self.handed_over, self.waits = self.waits[0][0] - 1, False, []
             self.restart()
-        self.last = x, y
+        self.last, self.most = (x, y), inf
 
     def expect_progress(self, remaining, least):
         """Insist where `remaining` has not fallen by more than `least` for some time."""
-        self.waited += self.period
+        self.waited += self.elapsed
         if remaining < self.best - least:
             self.best, self.waited = remaining, 0.0
-        elif self.waited > PATIENCE:
+        elif self.waited > self.patience:
             self.insist()
 
     def insist(self):
@@ -439,34 +536,62 @@ class Supervisor:
             self.guidance.detour(self.active)
         else:
             self.pace /= 2
-            self.hopeless = self.pace < SLOWEST
+            self.hopeless = self.pace < self.rules.slowest
 
     def hand_over(self, segment):
         """Put `segment` in force, once the robot has stood as long as was shown."""
-        self.done = segment == len(self.speeds)
-        if not self.done:
-            self.waiting += sum(self.guidance.pauses[self.active + 1 : segment + 1])
+        for place in range(self.active + 1, segment + 1):
+            self.expect_to_wait(place)
+        self.handed_over = segment == len(self.speeds)
+        if not self.handed_over:
             self.active = segment
             self.restart()
 
-    def waits(self):
-        """Whether the robot is to stand still in this period, because the demonstrator did."""
-        if self.waiting < self.period / 2:
-            return False
-        self.waiting -= self.period
-        return True
+    def expect_to_wait(self, place):
+        """Remember to stand at the start (0) or a subgoal, if the demonstrator did and the robot has not yet."""
+        left = self.guidance.pauses[place] - self.stood.get(place, 0.0)
+        if left >= self.period / 2:
+            self.waits.append([place, left])
+            self.stood.setdefault(place, 0.0)
+
+    def wait(self, theta):
+        """Brake, stand as long as was shown, and turn to where the demonstrator came from or went to."""
+        place, left = self.waits[0]
+        if self.standing:
+            self.waits[0][1] = left - self.elapsed
+            self.stood[place] += self.elapsed
+        if self.waits[0][1] < self.elapsed / 2:
+            self.waits.pop(0)
+        error = wrapped(self.guidance.headings[place] - theta)
+        return 0.0, self.turning(error) if self.standing and abs(error) > FACING else 0.0
+
+    def turning(self, error):
+        """Turning rate in rad/s by which an error in rad fades, and no faster than it can be ended."""
+        most = min(self.gain * abs(error), sqrt(2 * self.limits.turn_acceleration * abs(error)))
+        return copysign(min(most, self.limits.turn), error)
 
     def shown_speeds(self, k, places):
         """Speeds (N,) in m/s shown at places (N, 2) of segment k, within what the robot can."""
         speeds = self.speeds[k] * self.guidance.shown_pace(k, places)
-        return np.clip(speeds, LEAST_SPEED, self.limits.speed)
+        return np.clip(speeds, self.rules.least_speed, self.fastest)
+
+    def arriving(self, x, y):
+        """The speed in m/s from which the robot comes to rest where it is to stand, if that is next."""
+        last = self.active + 1 == len(self.speeds)
+        if not last and self.guidance.pauses[self.active + 1] < self.period / 2:
+            return inf
+        return max(
+            sqrt(2 * self.limits.acceleration * dist(self.guidance.goals[self.active], (x, y))),
+            ARRIVING,
+        )
 
     def safe(self, speed, x, y, theta):
         """The speed in m/s, or less where it could not be braked in time."""
         if not self.guidance.obstacles:
             return speed
         braking = self.limits.acceleration, self.period
-        return min(speed, self.guidance.obstacles.speed_limit(x, y, theta, *braking))
+        self.most = self.guidance.obstacles.speed_limit(x, y, theta, *braking)
+        return min(speed, self.most)
 
 
 class Plain(Supervisor):
@@ -478,9 +603,11 @@ class Plain(Supervisor):
     def command(self, x, y, theta):
         """v in m/s and omega in rad/s for a pose in m and rad."""
         self.notice_kidnapping(x, y)
-        if self.guidance.reached(self.active, x, y, REACH):
+        if not self.waits and self.guidance.reached(self.active, x, y, self.rules.reach):
             self.hand_over(self.active + 1)
-        if self.waits():
+        if self.waits:
+            return self.wait(theta)
+        if self.handed_over:
             return 0.0, 0.0
         remaining = self.guidance.remaining(self.active, x, y)
         self.expect_progress(remaining, 0.02 * min(remaining, 1.0))
@@ -488,9 +615,9 @@ class Plain(Supervisor):
         if ux == uy == 0.0:
             return 0.0, 0.0
         error = wrapped(atan2(uy, ux) - theta)
-        shown = float(self.shown_speeds(self.active, [(x, y)])[0])
-        speed = 0.0 if abs(error) > SHARP else shown * self.pace * cos(error)
-        return self.safe(speed, x, y, theta), clip(TURN_GAIN * error, self.limits.turn)
+        shown = min(float(self.shown_speeds(self.active, [(x, y)])[0]), self.arriving(x, y))
+        speed = 0.0 if abs(error) > self.rules.sharp else shown * self.pace * cos(error)
+        return self.safe(speed, x, y, theta), self.turning(error)
 
 
 class Pursuit(Supervisor):
@@ -503,6 +630,10 @@ class Pursuit(Supervisor):
     places = ((inf, inf),)  # no response yet: any pose is astray
     at = 0
 
+    def __init__(self, guidance, speeds, robot, rules=PIONEER_FOLLOWING):
+        super().__init__(guidance, speeds, robot, rules)
+        self.ahead = max(round(rules.look_ahead / STEP), 1)
+
     def plan(self, x, y):
         """Roll the response out from x, y in m, and straight on beyond its end, to be pursued."""
         self.places, self.segments = self.guidance.way(self.active, x, y)
@@ -512,22 +643,32 @@ class Pursuit(Supervisor):
         ux, uy = towards(end_x, end_y, *self.places[max(self.end - 2, 0)])
         if ux == uy == 0.0:
             ux, uy = self.guidance.direction(last, end_x, end_y)
-        on = range(1, LOOK_AHEAD + 1)
+        on = range(1, self.ahead + 1)
         self.places += [(end_x + i * STEP * ux, end_y + i * STEP * uy) for i in on]
-        segments = np.array(self.segments + [last] * LOOK_AHEAD)
-        demonstrated = np.empty(len(segments))
+        places, segments = np.array(self.places), np.array(self.segments + [last] * self.ahead)
+        speeds = np.empty(len(segments))
         for k in set(self.segments) | {last}:
             mine = segments == k
-            demonstrated[mine] = self.shown_speeds(k, np.array(self.places)[mine])
-        self.planned = bend_speeds(np.array(self.places), demonstrated, self.limits).tolist()
+            speeds[mine] = self.shown_speeds(k, places[mine])
+        speeds[self.stops(segments)] = ARRIVING
+        self.planned = bend_speeds(places, speeds, self.limits).tolist()
+
+    def stops(self, segments):
+        """Where among the places of segments (M,) the robot comes to rest: its waits and the end."""
+        waits = np.array(self.guidance.pauses[1:]) >= self.period / 2
+        ends = np.flatnonzero(np.diff(segments[: self.end + 1]) > 0)
+        return [*ends[waits[segments[ends]]], self.end]
 
     def command(self, x, y, theta):
         """v in m/s and omega in rad/s for a pose in m and rad."""
         self.notice_kidnapping(x, y)
-        if dist(self.places[self.at], (x, y)) > STRAY:
+        if dist(self.places[self.at], (x, y)) > self.rules.stray:
             self.plan(x, y)
-        self.advance(x, y)
-        if self.waits():
+        if not self.waits:
+            self.advance(x, y)
+        if self.waits:
+            return self.wait(theta)
+        if self.handed_over:
             return 0.0, 0.0
         ahead = self.pursued(x, y)
         error = wrapped(atan2(ahead[1] - y, ahead[0] - x) - theta)
@@ -535,14 +676,14 @@ class Pursuit(Supervisor):
         speed = self.pace * min(self.planned[self.at], self.limits.turn / max(abs(curvature), 1e-9))
         speed = self.safe(speed, x, y, theta)
         self.expect_progress(self.end - self.at, 0)
-        if abs(error) > SHARP or speed == 0.0:
-            return 0.0, clip(TURN_GAIN * error, self.limits.turn)
+        if abs(error) > self.rules.sharp or speed == 0.0:
+            return 0.0, self.turning(error)
         return speed, curvature * speed
 
     def pursued(self, x, y):
         """The place 0.35 m ahead, or a nearer one where going straight there would cut a corner."""
         obstacles = self.guidance.obstacles
-        for place in self.places[self.at + LOOK_AHEAD : self.at + 1 : -1]:
+        for place in self.places[self.at + self.ahead : self.at + 1 : -1]:
             if not obstacles or not obstacles.cuts_corner(x, y, *place):
                 return place
         return self.places[self.at + 1]
@@ -558,11 +699,11 @@ class Pursuit(Supervisor):
         The whole look-ahead counts: before a sharp turn at a subgoal the next place may be farther
         off, and those after the turn nearer.
         """
-        window = range(min(self.at + LOOK_AHEAD, self.end), self.at - 1, -1)
+        window = range(min(self.at + self.ahead, self.end), self.at - 1, -1)
         self.at = min(window, key=lambda i: dist(self.places[i], (x, y)))
         if self.segments[self.at] != self.active:
             self.hand_over(self.segments[self.at])
-        if self.at == self.end and self.guidance.reached(self.active, x, y, REACH):
+        if self.at == self.end and self.guidance.reached(self.active, x, y, self.rules.reach):
             self.hand_over(self.active + 1)
 
 

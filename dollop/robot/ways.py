@@ -17,15 +17,19 @@ along than the robot has come.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, cos, inf, isfinite, sin
+from math import ceil, cos, hypot, inf, isfinite, sin
 
 import numpy as np
 
-from dollop.robot.avoidance import INFLUENCE, KEPT, Geodesic
-from dollop.robot.control import CONTROL_LAWS, PATIENCE, REACH, STEP, Guidance
+from dollop.checks import Note
+from dollop.robot.avoidance import Geodesic
+from dollop.robot.control import CONTROL_LAWS, PIONEER_FOLLOWING, STEP, Guidance
 from dollop.trajectory import distance_to_polyline
 
 __all__ = ["Way", "WayKeeper", "counterpart", "extra_length", "fitting"]
+
+SAME = 0.25
+"""Distance in m within which two ways are one, and a robot stands where one begins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +157,7 @@ def _can_be(obstacles, x, y):
 
 def _astray(leg, own, obstacles):
     """Whether places (N, 2) are led farther from a way's own (M, 2) than round what is gone round."""
-    return distance_to_polyline(leg, own).max() > 2 * obstacles.radius + INFLUENCE
+    return distance_to_polyline(leg, own).max() > 2 * obstacles.radius + obstacles.rules.influence
 
 
 def counterpart(way, other, at):
@@ -181,8 +185,8 @@ def counterpart(way, other, at):
     >>> abs(counterpart(left, right, half) - half) <= 1
     True
     """
-    near = distance_to_polyline(way.places, other.places) <= REACH
-    near_other = distance_to_polyline(other.places, way.places) <= REACH
+    near = distance_to_polyline(way.places, other.places) <= SAME
+    near_other = distance_to_polyline(other.places, way.places) <= SAME
     size, size_other = len(near), len(near_other)
     before = min(_run_of_true(near), _run_of_true(near_other))
     after = min(_run_of_true(near[::-1]), _run_of_true(near_other[::-1]))
@@ -228,7 +232,7 @@ def fitting(options):
     least = min(each.extra for each in options)
     options = [each for each in options if each.extra == least]
     off = min(each.misfit for each in options)
-    options = [each for each in options if each.misfit <= off + REACH]
+    options = [each for each in options if each.misfit <= off + SAME]
     return max(options, key=lambda each: (each.way.shown, -each.way.index))
 
 
@@ -248,6 +252,7 @@ class WayKeeper:
         Makes an ObstacleMap of boxes (N, 4) in m that stand there beside what is known.
     avoid : bool
         Go round obstacles.
+    rules : Following
 
     Attributes
     ----------
@@ -257,15 +262,25 @@ class WayKeeper:
         Index of the way in force.
     left : dict of int to (float, float)
         The ways that the robot has left because it made no progress, and where in m.
+    refused : str
+        Why no way can be driven from where the robot began; empty if one can.
+    lines : dict of int to list of Line
+        What the segments keep to, of the ways that were in force.
     supervisor : Supervisor
         Of the way in force.
     """
 
-    def __init__(self, laws, shown, robot, control, chart, avoid=True):
+    def __init__(self, laws, shown, robot, control, chart, avoid=True, rules=PIONEER_FOLLOWING):
         self.ways = [Way(i, law, n) for i, (law, n) in enumerate(zip(laws, shown, strict=True))]
-        self.robot, self.control, self.chart, self.avoid = robot, control, chart, avoid
+        self.robot, self.control, self.chart, self.avoid, self.rules = (
+            robot,
+            control,
+            chart,
+            avoid,
+            rules,
+        )
         self.noticed, self.felt, self.left = np.empty((0, 4)), np.empty((0, 4)), {}
-        self.begun = len(self.ways) == 1
+        self.begun, self.refused, self.lines = False, "", {}
         self.remap()
         self.enter(self.ways[0], 0)
 
@@ -284,20 +299,100 @@ class WayKeeper:
         """Bool: whether there is no progress, and no other way to change to."""
         return self.supervisor.hopeless
 
-    @property
-    def reason(self):
-        """Where there is no progress, of which way, and what is the matter with the others."""
-        told = f"no progress towards subgoal {self.active}"
+    def reason(self, x, y):
+        """Where there is no progress, of which way, and what is the matter with the others.
+
+        Parameters
+        ----------
+        x, y : float
+            Where the robot is, in m.
+
+        Returns
+        -------
+        str
+        """
+        closed = self.closed(self.ways[self.way], self.active, x, y)
+        told = closed or f"no progress towards subgoal {self.active}"
         if len(self.ways) == 1:
             return told
         others = (self._tell(way.index) for way in self.ways if way.index != self.way)
-        return f"{told} of way {self.way} ({', '.join(others)})"
+        return f"{told}{', on' if closed else ' of'} way {self.way} ({', '.join(others)})"
 
     def _tell(self, way):
         """What is the matter with a way that is not in force."""
         if way not in self.left:
             return f"way {way} is closed"
         return "way {} was left at ({:.2f}, {:.2f})".format(way, *self.left[way])
+
+    @property
+    def enough(self):
+        """Distance in m within which a robot has come to a place: of handing over, or its radius."""
+        return max(self.rules.reach, self.known.radius)
+
+    def leapt(self, x, y, now_x, now_y):
+        """Whether no robot drives from one place to another in one period.
+
+        Parameters
+        ----------
+        x, y, now_x, now_y : float
+            Both places in m.
+
+        Returns
+        -------
+        bool
+        """
+        return hypot(now_x - x, now_y - y) > self.supervisor.jump
+
+    def waits(self):
+        """How the robot has waited.
+
+        Returns
+        -------
+        list of [int, float, float]
+            Of each pause of the way in force: its place (0 the start, k the k-th subgoal), and how
+            long in s it was shown and kept.
+        """
+        supervisor = self.supervisor
+        shown = enumerate(supervisor.guidance.pauses)
+        return [[k, s, supervisor.stood.get(k, 0.0)] for k, s in shown if s >= supervisor.period / 2]
+
+    def notes(self):
+        """What the robot noticed that the task's environment does not have.
+
+        Returns
+        -------
+        tuple of Note
+        """
+        if not len(self.noticed):
+            return ()
+        x, y = (self.noticed[0, :2] + self.noticed[0, 2:]) / 2
+        what = "an object" if len(self.noticed) == 1 else f"{len(self.noticed)} objects"
+        text = f"the robot noticed {what} at ({x:.2f}, {y:.2f}) that its map does not have: look and adapt the task"
+        return (Note("changed", text),)
+
+    def closed(self, way, segment, x, y):
+        """Why no way leads to the subgoals of a way.
+
+        Parameters
+        ----------
+        way : Way
+        segment : int
+            From whose subgoal on.
+        x, y : float
+            Where the robot is, in m.
+
+        Returns
+        -------
+        str
+            Empty if there is one.
+        """
+        if self.obstacles is None:
+            return ""
+        for k, goal in enumerate(way.law.subgoals.tolist()[segment:], segment):
+            told = self.obstacles.no_way((x, y), goal, self.enough)
+            if told:
+                return told.format(f"subgoal {k}")
+        return ""
 
     def remap(self):
         """Map what is known to stand there, and what the robot has felt."""
@@ -313,30 +408,40 @@ class WayKeeper:
         way : Way
         segment : int
         """
-        self.way, guidance = way.index, Guidance(way.law, self.obstacles)
-        self.supervisor = CONTROL_LAWS[self.control](guidance, way.law.speeds, self.robot)
+        self.way, guidance = way.index, Guidance(way.law, self.obstacles, self.rules)
+        self.lines[way.index] = guidance.lines
+        self.supervisor = CONTROL_LAWS[self.control](guidance, way.law.speeds, self.robot, self.rules)
         if segment:
             self.supervisor.hand_over(segment)
 
-    def command(self, x, y, theta):
+    def command(self, x, y, theta, elapsed, standing):
         """v in m/s and omega in rad/s for a pose, on the way that fits and is free.
 
         Parameters
         ----------
         x, y, theta : float
             Pose in m and rad.
+        elapsed : float
+            Time in s since the last command.
+        standing : bool
+            Whether the robot has been told to stand.
 
         Returns
         -------
-        (float, float)
+        command : (float, float)
+        most : float
+            Speed in m/s from which the robot can still brake in time.
         """
         self.notice(x, y)
+        self.supervisor.elapsed = elapsed
         if len(self.ways) > 1 and self.out_of_patience(x, y):
             self.leave(x, y, theta, longest=0.0)
+        self.supervisor.elapsed, self.supervisor.standing = elapsed, standing
         command = self.supervisor.command(x, y, theta)
         if len(self.ways) > 1 and self.hopeless and self.leave(x, y, theta, longest=inf):
+            self.supervisor.elapsed, self.supervisor.standing = elapsed, standing
             command = self.supervisor.command(x, y, theta)
-        return command
+        return command, self.supervisor.most
 
     def begin(self, x, y):
         """Put the way in force that fits the start and is free, once.
@@ -351,10 +456,19 @@ class WayKeeper:
         if self.begun:
             return
         self.begun = True
-        self._has_noticed()
+        if self._has_noticed():
+            self.enter(self.ways[0], 0)
+        closed = [self.closed(way, 0, x, y) for way in self.ways]
+        others = f", on way 0 ({len(closed) - 1} more are closed)" if len(closed) > 1 else ""
+        self.refused = closed[0] + others if all(closed) else ""
+        if len(self.ways) > 1 and not self.refused:
+            self._choose(x, y)
+
+    def _choose(self, x, y):
+        """Put the way in force that fits x, y in m and is free."""
         from_starts = [float(np.hypot(*(way.law.start - [x, y]))) for way in self.ways]
         misfits = from_starts
-        if min(from_starts) > REACH:
+        if min(from_starts) > SAME:
             misfits = [float(distance_to_polyline([[x, y]], way.places)[0]) for way in self.ways]
         last = [way.segments.searchsorted(1) - 1 for way in self.ways]
         options = self.options(self.ways, last, x, y)
@@ -452,9 +566,9 @@ class WayKeeper:
         bool
         """
         supervisor, k = self.supervisor, self.active
-        if supervisor.waited + supervisor.period <= PATIENCE:
+        if supervisor.waited + supervisor.elapsed <= supervisor.patience:
             return False
-        guidance = Guidance(self.ways[self.way].law, self.obstacles)
+        guidance = Guidance(self.ways[self.way].law, self.obstacles, self.rules)
         guidance.way(k, x, y)
         return k in supervisor.guidance.detours or k not in guidance.detours
 
@@ -490,10 +604,10 @@ class WayKeeper:
 
     def _ahead(self, x, y, theta):
         """Boxes (N, 4) in m: a bar across what lies ahead, as far off as is kept from obstacles."""
-        radius = self.known.radius
-        half, width = radius / 2**0.5, 2 * radius + INFLUENCE
+        radius, rules = self.known.radius, self.known.rules
+        half, width = radius / 2**0.5, 2 * radius + rules.influence
         along, across = np.array([cos(theta), sin(theta)]), np.array([-sin(theta), cos(theta)])
         count = ceil(width / half)
         aside = np.linspace(-width, width, count)[:, None] * across
-        centres = np.array([x, y]) + (2 * radius + KEPT) * along + aside
+        centres = np.array([x, y]) + (2 * radius + rules.kept) * along + aside
         return np.hstack([centres - half, centres + half])

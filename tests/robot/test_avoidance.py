@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.robot import avoidance
-from dollop.robot.avoidance import INFLUENCE, KEPT, Geodesic, ObstacleMap
+from dollop.robot.avoidance import PIONEER_AVOIDANCE, Geodesic, ObstacleMap
 
 BOX = ObstacleMap.of(Environment([[-0.5, -0.5, 0.5, 0.5]]))
 angles = st.floats(-np.pi, np.pi)
@@ -62,7 +62,7 @@ def test_open_world_has_no_edge():
 @given(places, angles)
 def test_unchanged_where_nothing_is_near(place, angle):
     """Beyond the influence the direction comes back as it was, to the last bit."""
-    if BOX.edge(*place) >= INFLUENCE:
+    if BOX.edge(*place) >= PIONEER_AVOIDANCE.influence:
         assert BOX.modulate(*place, *unit(angle)) == unit(angle)
 
 
@@ -80,8 +80,8 @@ def test_modulation_is_the_formula(place, angle):
     """Within the influence: 1 - 1/Gamma along the normal, 1 + 1/Gamma along the tangent."""
     edge, nx, ny = BOX._edge_and_slope(*place)
     n, u = np.array([nx, ny]) / max(np.hypot(nx, ny), 1e-12), np.array(unit(angle))
-    if edge < INFLUENCE and n @ u < -1e-6 and np.hypot(nx, ny) > 0.1:
-        share = (INFLUENCE - edge) / (INFLUENCE - KEPT)
+    if edge < PIONEER_AVOIDANCE.influence and n @ u < -1e-6 and np.hypot(nx, ny) > 0.1:
+        share = (PIONEER_AVOIDANCE.influence - edge) / (PIONEER_AVOIDANCE.influence - PIONEER_AVOIDANCE.kept)
         turned = (1 - share) * (n @ u) * n + (1 + share) * (u - (n @ u) * n)
         if np.hypot(*turned) > 1e-6:
             expected = tuple(turned / np.hypot(*turned))
@@ -92,7 +92,7 @@ def test_modulation_is_the_formula(place, angle):
 def test_never_towards_what_is_at_the_kept_distance(place, angle):
     """At the kept distance or nearer, the direction has unit length and leads out, or along."""
     edge, nx, ny = BOX._edge_and_slope(*place)
-    if edge <= KEPT and nx * nx + ny * ny > 0.5:
+    if edge <= PIONEER_AVOIDANCE.kept and nx * nx + ny * ny > 0.5:
         ux, uy = BOX.modulate(*place, *unit(angle))
         assert np.hypot(ux, uy) == pytest.approx(1)
         assert nx * ux + ny * uy >= -1e-9
@@ -109,7 +109,7 @@ def test_flow_keeps_clear_of_a_convex_obstacle(bearing, offset):
             break
         ux, uy = BOX.modulate(x, y, (goal[0] - x) / way, (goal[1] - y) / way)
         x, y = x + 0.03 * ux, y + 0.03 * uy
-        assert BOX.edge(x, y) > KEPT - 0.05
+        assert BOX.edge(x, y) > PIONEER_AVOIDANCE.kept - 0.05
 
 
 @given(places, angles, st.floats(0.3, 3.0))

@@ -15,8 +15,8 @@ from dollop.pose import wrapped
 from dollop.robot.avoidance import ObstacleMap
 from dollop.robot.control import (
     CONTROL_LAWS,
+    PIONEER_FOLLOWING,
     PIONEER_LIMITS,
-    REACH,
     STEP,
     Guidance,
     Limits,
@@ -109,7 +109,7 @@ def test_no_start_and_no_sequence_makes_the_response_diverge(seed, start):
     state, steps = np.array(start), 0
     for segment in law.segments:
         best = segment.lyapunov(state)
-        while np.linalg.norm(state - segment.goal) > REACH:
+        while np.linalg.norm(state - segment.goal) > PIONEER_FOLLOWING.reach:
             state, steps = segment.step(state), steps + 1
             assert segment.lyapunov(state) <= best * (1 + 1e-9)
             best = segment.lyapunov(state)
@@ -136,7 +136,7 @@ def test_segments_hand_over_in_order_at_their_subgoals(law, control):
         assert supervisor.active == k
         while supervisor.active == k and not supervisor.done:
             robot.drive(*supervisor.command(*robot.pose))
-        assert np.hypot(*(robot.pose[:2] - goal)) < REACH + 0.1
+        assert np.hypot(*(robot.pose[:2] - goal)) < PIONEER_FOLLOWING.reach + 0.1
     assert supervisor.done
 
 
@@ -149,7 +149,7 @@ def test_kidnapping_keeps_the_segment(law):
     robot.place((*law.subgoals[3] + 0.5, 1.0))
     while supervisor.active == 1:
         robot.drive(*supervisor.command(*robot.pose))
-    assert np.hypot(*(robot.pose[:2] - law.subgoals[1])) < REACH + 0.06
+    assert np.hypot(*(robot.pose[:2] - law.subgoals[1])) < PIONEER_FOLLOWING.reach + 0.06
 
 
 def test_rolled_out_response_is_that_of_the_sequence(law):

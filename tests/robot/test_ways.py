@@ -8,7 +8,8 @@ import pytest
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.robot.avoidance import ObstacleMap
-from dollop.robot.performing import Run, Unicycle, perform
+from dollop.robot.performing import Unicycle, perform
+from dollop.robot.run import Run
 from dollop.robot.ways import Way, counterpart, extra_length, fitting
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import distance_to_polyline, resample
@@ -260,7 +261,8 @@ def test_where_no_way_leads_through_it_gives_up_and_names_all(found):
     bare = SimpleNamespace(law=BETWEEN, ways=(BETWEEN, ROUND), shown=(3, 1), environment=Environment([]))
     run = perform(bare, Noticing(START, *found), background=background)
     assert not run.finished and run.collisions == 0
-    assert run.reason.startswith("no progress towards subgoal 0 of way 0 (way 1 is closed) at ")
+    assert run.reason.startswith("there is no way to subgoal 0 for a robot of 0.25 m radius that keeps 0.05 m: none")
+    assert ", on way 0 (way 1 is closed) at " in run.reason if found else run.reason.endswith("(1 more are closed)")
 
 
 def test_held_fast_it_tries_every_way_and_names_all():
