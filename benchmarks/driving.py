@@ -46,6 +46,8 @@ SLOW = 20.0
 """ms: a step that takes longer is slow."""
 GROUPS = ("radius",)
 """Columns by which runs are told apart."""
+NO_WAY = "no way|no room|must be free|must lie"
+"""What reasons say that a robot of this size cannot do the task here."""
 FAR = 0.5
 """m: beyond it a clearance tells nothing."""
 
@@ -266,6 +268,8 @@ def of_radius(radius, part):
         line[f"way_{100 * margin:g}cm"] = f"{(some.outcome == 'finished').sum()}/{len(some)}"
     none = part[part.margin < 0]
     line["no_way"] = ", ".join(f"{n} {name}" for name, n in none.outcome.value_counts().items())
+    unfinished = none[none.outcome != "finished"]
+    line["said_so"] = f"{unfinished.reason.fillna('').str.contains(NO_WAY).sum()}/{len(unfinished)}"
     line |= {"touched": int(ran.touched.sum()), "told_touched": int((ran.collisions > 0).sum())}
     line |= {"wrong": int((part.outcome == "wrong").sum()), "crashed": int((part.outcome == "crashed").sum())}
     line |= {"told_error": ran.told_error.max(), "step_ms": ran.step_ms.median(), "step_ms_max": ran.step_ms.max()}
