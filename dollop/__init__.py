@@ -36,6 +36,7 @@ III               supervisory control law: segments hand over   `robot.control`
 III   u           its direction in the segment in force         `robot.control.Guidance`
 III   v, omega    speed and turning rate that it asks for       `robot.control.CONTROL_LAWS`
 III               performing a task; kidnapping the robot       `perform`
+                  the task as a route for other software        `export`
 IV    Omega^i     environment configuration i: 4N corners       `Environment.corners`
 IV-A  omega_m^i   corner m of Omega^i                           row m of it
 IV-A  k_{m,n}^i   spring constant between two corners           `environment.spring_constants`
@@ -69,6 +70,7 @@ from dollop.lds import LDS
 from dollop.matching import Matching, match
 from dollop.observation import Observation, Observer, observe
 from dollop.robot import Controller, Run, Unicycle, localise, perform
+from dollop.route import Route, export
 from dollop.sequenced_lds import SequencedLDS
 from dollop.task import Demonstration, Task, learn
 from dollop.tracking import Motion, Track, Tracker
@@ -77,7 +79,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "LDS", "Association", "Controller", "Demonstration", "Environment", "FormatError", "Frames", "LaserLog",
-    "Matching", "Motion", "Note", "Observation", "Observer", "OccupancyGrid", "Run", "SequencedLDS", "SubgoalHMM",
-    "Task", "Track", "Tracker", "Unicycle", "__version__", "associate", "associate_with_frames",
-    "laps", "learn", "localise", "match", "observe", "perform", "read_log", "write_log",
+    "Matching", "Motion", "Note", "Observation", "Observer", "OccupancyGrid", "Route", "Run", "SequencedLDS",
+    "SubgoalHMM", "Task", "Track", "Tracker", "Unicycle", "__version__", "associate", "associate_with_frames",
+    "export", "laps", "learn", "localise", "match", "observe", "perform", "read_log", "write_log",
 ]  # fmt: skip

@@ -157,7 +157,7 @@ class OccupancyGrid:
         ----------
         path : str or Path
             `.yaml` or `.yml`, which names its picture, PGM or PNG: ROS
-            (http://wiki.ros.org/map_server); `.map`, packed or not: CARMEN (`map_io.h`); `.bag`,
+            (http://wiki.ros.org/map_server); `.map` or `.map.gz`: CARMEN (`map_io.h`); `.bag`,
             `.mcap`, `.db3` or the folder of a ROS 2 bag: the map that was sent on `/map`, or on the
             only topic of nav_msgs/OccupancyGrid.
 
@@ -181,8 +181,8 @@ class OccupancyGrid:
         Parameters
         ----------
         path : str or Path
-            `.yaml` or `.yml`: ROS, and beside it a `.pgm` of the same name; `.map`: CARMEN. The
-            file appears whole or not at all, and the picture with it.
+            `.yaml` or `.yml`: ROS, and beside it a `.pgm` of the same name; `.map`, or `.map.gz` to
+            have it packed: CARMEN. The file appears whole or not at all, and the picture with it.
 
         Raises
         ------
@@ -410,10 +410,10 @@ def check_is_map(path):
     Raises
     ------
     FormatError
-        If it ends neither in `.yaml` or `.yml` (ROS) nor in `.map` (CARMEN).
+        If it ends neither in `.yaml` or `.yml` (ROS) nor in `.map` or `.map.gz` (CARMEN).
     """
-    if checked_path(path).suffix not in (".map", ".yaml", ".yml"):
-        raise FormatError("a map is named .yaml (ROS) or .map (CARMEN)", path)
+    if not checked_path(path).name.endswith((*carmen_map.SUFFIXES, ".yaml", ".yml")):
+        raise FormatError("a map is named .yaml (ROS), .map or .map.gz (CARMEN)", path)
 
 
 def map_outputs(path):
@@ -456,7 +456,7 @@ def map_inputs(path):
 def _format_of(path):
     """The module that reads and writes maps of this name."""
     check_is_map(path)
-    if Path(path).suffix == ".map":
+    if Path(path).name.endswith(carmen_map.SUFFIXES):
         return carmen_map
     from dollop.formats import ros_map  # only now: PyYAML and Pillow take long to load
 
@@ -642,8 +642,8 @@ def covered_cells(boxes, origin, resolution, shape):
     return covered
 
 
-def distances_to(cells, side=1.0):
-    """Distance of every cell of a grid to the nearest of some, centre to centre.
+def distances_to(cells, side=1.0, reach=0.0):
+    """Distance of the centre of every cell of a grid to the nearest of some cells, their centres or their edges.
 
     Row by row, so that next to the result it takes 9 bytes a cell for a moment (SciPy's own 48).
 
@@ -653,6 +653,8 @@ def distances_to(cells, side=1.0):
         Where some are; if there are none, the distances are no numbers to be used.
     side : float
         Of a cell in m.
+    reach : float
+        How far each of those cells reaches from its centre along x and y, in m: to its edges half a side.
 
     Returns
     -------
@@ -669,5 +671,7 @@ def distances_to(cells, side=1.0):
     distances, columns = np.empty(cells.shape), np.arange(cells.shape[1])
     for row, (near_row, near_column) in enumerate(zip(*nearest, strict=True)):
         down, right = (near_row - row) * side, (near_column - columns) * side
+        if reach:
+            down, right = (np.maximum(np.abs(each) - reach, 0) for each in (down, right))
         np.sqrt(down * down + right * right, out=distances[row])
     return distances

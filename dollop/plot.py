@@ -8,11 +8,14 @@ writing.
 Everything is drawn into axes that are given; a label goes into their legend once.
 """
 
+from io import BytesIO
 from itertools import pairwise
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.colors import ListedColormap
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Ellipse, Polygon, Rectangle
 from matplotlib.patheffects import withStroke
 
@@ -27,10 +30,13 @@ LAW = "#009E73"  # green: the control law and its response
 SUBGOAL = "#000000"
 RUN = "#CC79A7"  # pink: where the robot went
 OCCLUDED = "#E69F00"  # orange: predictions while the user is occluded
+_WAIT = "#8A5A00"  # dark orange: times that are written beside a wait
 BACKGROUND = "#8C8C8C"  # grey: the background map, and how things were before
 TRUTH = "#56B4E9"  # light blue: where the user or an object really was
-_ROBOT = "#F0E442"  # yellow
+ROBOT = "#F0E442"  # yellow
 _MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper
+LATER = LinearSegmentedColormap.from_list("later", ["#9ECAE9", "#08306B"])  # blue, darker with time
+_FLOOR = "#E8E8E8"  # palest grey: free floor of a map
 _RAY = "#C3CED6"  # pale grey: the laser's rays
 
 _RUN_SHADES = ("#CC79A7", "#7A3B62", "#E3A9C8", "#A6437C", "#4F2340")
@@ -136,6 +142,20 @@ def grid_map(ax, grid, colour=BACKGROUND):
     cells(ax, grid.occupied.astype(float), grid, cmap=ListedColormap([colour]))
 
 
+def whole_map(ax, grid):
+    """A map: its occupied cells, and pale its free floor; what is unknown stays blank.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    grid : OccupancyGrid
+    """
+    cells(ax, grid.free.astype(float), grid, cmap=ListedColormap([_FLOOR]))
+    grid_map(ax, grid)
+    for colour, name in ((BACKGROUND, "occupied"), (_FLOOR, "free")):
+        ax.plot([], [], "s", color=colour, label=name)
+
+
 def cells(ax, values, grid, **look):
     """The values of a map's cells as an image; cells that are zero stay blank.
 
@@ -188,8 +208,8 @@ def robot(ax, pose, radius=_RIM, label=None):
     label : str, optional
     """
     (x, y, theta), radius = checked_positions("pose", pose, 3), checked_number("radius", radius, 0)
-    ax.add_patch(Circle((x, y), radius, facecolor=_ROBOT, edgecolor="black", zorder=4))
-    ax.plot([], [], "o", color=_ROBOT, markeredgecolor="black", markersize=10, label=label)
+    ax.add_patch(Circle((x, y), radius, facecolor=ROBOT, edgecolor="black", zorder=4))
+    ax.plot([], [], "o", color=ROBOT, markeredgecolor="black", markersize=10, label=label)
     ahead = [x, x + radius * np.cos(theta)], [y, y + radius * np.sin(theta)]
     ax.plot(*ahead, color="black", zorder=5)
 
@@ -338,7 +358,7 @@ def runs(ax, runs):
             shade, line = _RUN_SHADES[k % 5], _RUN_LINES[k % 5]
             look = {"linewidth": 1.2, "colour": shade, "linestyle": line}
         places = run.true_poses[:, :2]
-        leaps = np.searchsorted(run.t, run.kidnapped - 0.5 * run.t[1:2].sum())
+        leaps = _leaps(run)
         for n, part in enumerate(np.split(places, leaps)):
             path(ax, part, "robot's runs" if k == n == 0 else None, **look)
         for leap in leaps:
@@ -347,10 +367,15 @@ def runs(ax, runs):
             ax.plot(*places[leap], "o", color="black", markersize=4, zorder=6)
             _write(ax, k + 1, places[leap], (0, 9), ha="center", va="center", weight="bold")
     hit = [run for run in runs if run.collisions]
-    for run in hit:
+    _contacts(ax, hit)
+
+
+def _contacts(ax, runs):
+    """The rim of the robot where each of some runs first touched something."""
+    for run in runs:
         rim = {"fill": False, "edgecolor": "black", "linewidth": 0.8, "zorder": 7}
-        ax.add_patch(Circle(_first_contact(run), _RIM, **rim))
-    if hit:
+        ax.add_patch(Circle(_first_contact(run), getattr(run, "radius", _RIM), **rim))
+    if runs:
         look = {"color": "black", "markersize": 10, "fillstyle": "none", "markeredgewidth": 0.8}
         ax.plot([], [], "o", label="first contact, robot's rim", **look)
 
@@ -359,6 +384,200 @@ def _first_contact(run):
     """Where (2,) a Run that touched something was when its rim first met an obstacle."""
     met = np.flatnonzero(run.clearance < 0)
     return run.true_poses[met[0] if len(met) else run.clearance.argmin(), :2]
+
+
+def task(ax, task):
+    """A task: its way or ways, its subgoals and waits, the objects, and which of them it follows.
+
+    Subgoals are numbered from 1, objects from 0 as in the environment. Where the task was shown
+    among the objects as they stand, the walks are drawn too.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    task : Task
+    """
+    _numbered_boxes(ax, task.environment)
+    label = "walks shown"
+    for shown in task.demonstrations:
+        if np.array_equal(shown.environment.boxes, task.environment.boxes):
+            for walk in shown.walks:
+                path(ax, walk, label, USER, linewidth=0.6, alpha=0.5)
+                label = None
+    _follows(ax, task)
+    label = "other ways"
+    for other in task.ways[1:]:
+        law(ax, other.response(), label, linewidth=1.2, linestyle="--")
+        label = None
+    law(ax, task.law.response(), "way of the task")
+    subgoals(ax, task.law.subgoals)
+    for k, place in enumerate(task.law.subgoals, 1):
+        _write(ax, k, place, (6, 5), weight="bold")
+    ax.plot(
+        *task.law.start,
+        "o",
+        color=LAW,
+        markeredgecolor="black",
+        markersize=8,
+        zorder=6,
+        label="start",
+    )
+    _waits(ax, task.law)
+
+
+def _numbered_boxes(ax, environment):
+    """The objects of an environment, each with its number."""
+    boxes(ax, environment.boxes, "objects, by number")
+    for k, (x0, y0, x1, y1) in enumerate(environment.boxes):
+        middle = ((x0 + x1) / 2, (y0 + y1) / 2)
+        _write(ax, k, middle, (0, 0), color=OBSTACLE, ha="center", va="center", weight="bold")
+
+
+_LEAST_FOLLOWED = 0.25
+"""The share of a place that an object must carry for a line to be drawn to it: a place has few of so many."""
+
+
+def _follows(ax, task):
+    """A dotted line from the start and each subgoal to the objects that they follow, wider for more of it."""
+    tied, label = task.association, "follows"
+    places = np.vstack([task.law.start, task.law.subgoals])
+    middles = task.environment.boxes.reshape(-1, 2, 2).mean(axis=1)
+    for place, corners, weights in zip(places, tied.corners, tied.weights, strict=True):
+        shares = np.bincount(corners // 4, weights, minlength=len(middles))
+        for k in np.flatnonzero(shares > _LEAST_FOLLOWED):
+            look = {"linestyle": ":", "linewidth": 2.5 * shares[k], "zorder": 1}
+            path(ax, [place, middles[k]], label, OBSTACLE, **look)
+            label = None
+
+
+def _waits(ax, law, stood=()):
+    """A ring, and the time in s, where the law waits; with rows (W, 3) of `Run.waits` how long was stood."""
+    places = np.vstack([law.start, law.subgoals])
+    pauses = np.zeros(len(places)) if law.pauses is None else law.pauses
+    told = {int(k): f"{seconds:.1f} of {shown:.1f} s" for k, shown, seconds in stood}
+    label = "waits"
+    for k, (place, wait) in enumerate(zip(places, pauses, strict=True)):
+        if wait > 0:
+            look = {"color": OCCLUDED, "markersize": 16, "markeredgewidth": 2, "fillstyle": "none"}
+            ax.plot(*place, "o", label=label, zorder=6, **look)
+            _write(ax, told.get(k, f"{wait:.1f} s"), place, (11, -14), color=_WAIT, weight="bold")
+            label = None
+
+
+def run(ax, run, task=None):
+    """What came of a task: where the robot was, which subgoals it reached, kidnappings, waits and contacts.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    run : Run
+    task : Task, optional
+        That was performed; its way in force at the end is drawn, and its objects.
+    """
+    if task is not None:
+        _numbered_boxes(ax, task.environment)
+        way = task.ways[min(int(run.way[-1]), len(task.ways) - 1)]
+        law(ax, way.response(), "way of the task", linewidth=1.2, alpha=0.7)
+        reached = np.asarray(_reached(run, way), bool)
+        for flags, look, label in (
+            (reached, SUBGOAL, "reached"),
+            (~reached, BACKGROUND, "not reached"),
+        ):
+            if flags.any():
+                ax.plot(*way.subgoals[flags].T, "x", color=look, **_CROSS, label=f"subgoals, {label}")
+        _waits(ax, way, run.waits)
+    places, leaps = run.true_poses[:, :2], _leaps(run)
+    for n, part in enumerate(np.split(places, leaps)):
+        path(ax, part, None if n else "robot", RUN, linewidth=1.6)
+    for n, leap in enumerate(leaps):
+        path(ax, places[leap - 1 : leap + 1], None if n else "kidnapped", "black", linestyle=":")
+        ax.plot(*places[leap], "o", color="black", markersize=4, zorder=6)
+        _write(ax, n + 1, places[leap], (0, 9), ha="center", va="center", weight="bold")
+    _contacts(ax, [run] if run.collisions else [])
+    known = run.true_poses[np.isfinite(run.true_poses).all(axis=1)]
+    if len(known):
+        ax.plot(
+            *known[0, :2],
+            "o",
+            color=RUN,
+            markeredgecolor="black",
+            markersize=7,
+            zorder=5,
+            label="begin",
+        )
+        robot(ax, known[-1], run.radius, "robot at the end")
+
+
+_CROSS = {"markersize": 9, "markeredgewidth": 2.5, "zorder": 6, "linestyle": "none"}
+
+
+def _leaps(run):
+    """Rows of a run in which the robot stands where it was put."""
+    return np.searchsorted(run.t, run.kidnapped - 0.5 * run.t[1:2].sum())
+
+
+def _reached(run, way):
+    """Which subgoals (K,) of a way a run reached, bool: what it says, or those before the segment at its end."""
+    if len(run.reached) == len(way.segments):
+        return run.reached
+    return np.arange(len(way.segments)) < (len(way.segments) if run.finished else run.active[-1])
+
+
+_WIDE, _LEAST_HIGH, _MOST_HIGH = 7.0, 4.5, 9.0
+"""Inches: width of a picture, and bounds of its height."""
+
+
+def figure_of(draw, title=None):
+    """A figure of one plane, drawn in house style, with its legend under it.
+
+    Parameters
+    ----------
+    draw : callable
+        Draws into axes.
+    title : str, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        It is no figure of pyplot: nobody has to close it.
+    """
+    with style():
+        figure = Figure(figsize=(_WIDE, _MOST_HIGH))
+        FigureCanvasAgg(figure)
+        ax = plane(figure.add_subplot(), title)
+        draw(ax)
+        ax.margins(0.05)
+        width, height = np.ptp([ax.get_xlim(), ax.get_ylim()], axis=1)
+        figure.set_figheight(np.clip(0.8 + _WIDE * height / width, _LEAST_HIGH, _MOST_HIGH))
+        handles, labels = ax.get_legend_handles_labels()
+        if labels:
+            figure.legend(handles, labels, loc="outside lower center", ncols=4, columnspacing=1.2)
+        return figure
+
+
+def png(draw, title=None):
+    """A picture of one plane.
+
+    Parameters
+    ----------
+    draw : callable
+        Draws into axes.
+    title : str, optional
+
+    Returns
+    -------
+    bytes
+        A PNG; the same for the same drawing.
+
+    Examples
+    --------
+    >>> png(lambda ax: path(ax, [[0, 0], [1, 2]], "walk"))[1:4]
+    b'PNG'
+    """
+    stream = BytesIO()
+    with style():
+        figure_of(draw, title).savefig(stream, format="png")
+    return stream.getvalue()
 
 
 def cdhmm(ax, model, sd=2.0):

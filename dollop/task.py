@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -228,7 +228,17 @@ class Task:
     def __repr__(self):
         shown, subgoals = len(self.demonstrations), len(self.law.segments)
         ways = f" in {len(self.ways)} ways" if len(self.ways) > 1 else ""
-        return f"Task of {subgoals} subgoals, shown {shown} x{ways}; {self.environment}"
+        pauses = () if self.law.pauses is None else self.law.pauses[self.law.pauses > 0]
+        waits = f", waits {len(pauses)} x, {sum(pauses):.1f} s in all" if len(pauses) else ""
+        doubts = ", ".join(dict.fromkeys(note.kind for note in self.notes if note.doubt))
+        told = f"Task of {subgoals} subgoals, shown {shown} x{ways}{waits}; {self.environment}"
+        return f"{told}; in doubt: {doubts}" if doubts else told
+
+    def _repr_png_(self):
+        """The task as a picture, which notebooks show."""
+        from dollop import plot
+
+        return plot.png(partial(plot.task, task=self))
 
     @property
     def trusted(self):

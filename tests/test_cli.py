@@ -145,7 +145,7 @@ def test_an_interrupt_while_drawing_leaves_the_old_files(room, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dollop.cli._write_track", interrupted)
+    monkeypatch.setattr("dollop.cli.observing._write_track", interrupted)
     with pytest.raises(SystemExit) as end:
         main(["observe", "walk.log.gz", "room.yaml", "--tracks", "all.csv", "--min-area", "0.02"])
     assert end.value.code == 130 and content(room) == before
@@ -213,7 +213,8 @@ def test_a_result_in_doubt_is_written_and_ends_with_status_3(two_people, tmp_pat
     assert end.value.code == 3
     assert "doubt: people: 2 people walk about as fast" in told.err
     assert "--user X,Y" in told.err and "  0: from (" in told.err and "  1: from (" in told.err
-    assert told.out.splitlines()[-1] == "wrote user.csv, user.png" and len(pd.read_csv("user.csv")) > 800
+    assert told.out.splitlines()[-1].startswith("wrote user.csv, user.png, in doubt (people); next: ")
+    assert len(pd.read_csv("user.csv")) > 800
 
 
 @pytest.mark.parametrize(("user", "begin"), [("4.6,3.6", (4.6, 3.65)), ("6,1.8", (6.1, 1.8))])
@@ -270,10 +271,11 @@ def test_an_unknown_command_lists_the_known_ones_in_one_line(capsys):
         main(["obsevre", "a.log"])
     assert end.value.code == 2
     told = capsys.readouterr().err
-    assert told == "dollop: no command 'obsevre'; known: map, observe, data, study\n"
+    known = "map, observe, learn, adapt, perform, show, export, data, study"
+    assert told == f"dollop: no command 'obsevre'; known: {known}\n"
 
 
-def test_an_interrupt_ends_with_one_line(monkeypatch, capsys):
+def test_an_interrupt_ends_with_one_line(monkeypatch, capsys, tmp_path):
     """Ctrl-C while a command works: exit status 130, and no traceback."""
 
     def interrupted(*_):
@@ -281,7 +283,7 @@ def test_an_interrupt_ends_with_one_line(monkeypatch, capsys):
 
     monkeypatch.setattr(dollop, "read_log", interrupted)
     with pytest.raises(SystemExit) as end:
-        main(["observe", "a.log", "b.map", "--out", "c.csv"])
+        main(["observe", EIGHTS, "b.map", "--out", str(tmp_path / "c.csv")])
     assert end.value.code == 130
     assert capsys.readouterr().err.strip() == "dollop: stopped"
 

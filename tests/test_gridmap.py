@@ -1,5 +1,6 @@
 """Occupancy grids: built from logs, measured, written and read."""
 
+import gzip
 import os
 import tempfile
 import tracemalloc
@@ -15,7 +16,7 @@ from hypothesis.extra import numpy as hnp
 from dollop import gridmap
 from dollop.formats.files import FormatError
 from dollop.formats.logs import read_log
-from dollop.gridmap import OccupancyGrid, distances_to
+from dollop.gridmap import OccupancyGrid, distances_to, map_inputs, map_outputs
 from dollop.laser import LaserLog
 
 ROOM = np.array([[-2.02, 3.01], [-1.51, 2.53]])  # xmin, xmax; ymin, ymax
@@ -200,6 +201,36 @@ def test_bad_values_are_named(change, message):
         OccupancyGrid(**(good | change))
 
 
+@pytest.mark.parametrize("name", ["room.map", "room.map.gz"])
+def test_a_map_comes_back_packed_or_not(tmp_path, name):
+    """CARMEN's maps keep cells, corner and resolution; what a command reads and writes is the file of that name."""
+    grid = OccupancyGrid([[0.0, 1.0, np.nan], [0.25, 0.5, 0.75]], (1.5, -2.0), 0.05)
+    grid.save(tmp_path / name)
+    read = OccupancyGrid.load(tmp_path / name)
+    np.testing.assert_array_equal(read.occupancy, grid.occupancy)
+    assert (read.origin, read.resolution) == (grid.origin, grid.resolution)
+    assert map_inputs(tmp_path / name) == [each.path for each in map_outputs(tmp_path / name)] == [tmp_path / name]
+
+
+def test_a_packed_map_replaces_maps_only(tmp_path):
+    """It may take the place of a map, packed or not; of a log that is packed as well it may not."""
+    grid = OccupancyGrid([[0.0, 1.0]], (0.0, 0.0), 0.05)
+    grid.save(tmp_path / "a.map")
+    (tmp_path / "a.map").rename(tmp_path / "a.map.gz")
+    grid.save(tmp_path / "a.map.gz")
+    assert (tmp_path / "a.map.gz").read_bytes()[:2] == b"\x1f\x8b"
+    (tmp_path / "b.map.gz").write_bytes(gzip.compress(b"# CARMEN Logfile\n"))
+    with pytest.raises(FileExistsError, match="it holds a CARMEN log and not a CARMEN map"):
+        grid.save(tmp_path / "b.map.gz")
+
+
+@pytest.mark.parametrize("name", ["a.gz", "a.yaml.gz", "a.map.GZ", "a.MAP.gz", "a.map.bz2", "a.log.gz"])
+def test_only_carmen_maps_are_packed(tmp_path, name):
+    """Any other name is refused, as it is for logs: `.log.gz` is a log, `.MAP.GZ` nothing."""
+    with pytest.raises(FormatError, match=r"a map is named \.yaml \(ROS\), \.map or \.map\.gz \(CARMEN\)"):
+        OccupancyGrid([[0.0, 1.0]], (0.0, 0.0), 0.05).save(tmp_path / name)
+
+
 def test_maps_by_suffix(tmp_path):
     """Other names are refused, on reading and on writing; a picture that is missing is named."""
     grid = OccupancyGrid([[0.0, 1.0]], (0.0, 0.0), 0.05)
@@ -218,7 +249,7 @@ EDITS = st.tuples(st.integers(0, 10**6), st.integers(0, 2), st.binary(max_size=6
 
 @settings(max_examples=200)
 @given(
-    name=st.sampled_from(["a.map", "a.yaml", "a.pgm"]),
+    name=st.sampled_from(["a.map", "a.map.gz", "a.yaml", "a.pgm"]),
     edits=st.lists(EDITS, min_size=1, max_size=4),
 )
 def test_damaged_maps_never_fail_in_the_depth(name, edits):

@@ -1,5 +1,7 @@
 """The drawing vocabulary: what is drawn lies where the data is, and says once what it is."""
 
+from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
@@ -8,7 +10,7 @@ import pytest
 from matplotlib.patches import Circle, Ellipse, Polygon
 from rooms import ANGLES, CANS, WALLS, room_map, scan
 
-from dollop import plot
+from dollop import Demonstration, Environment, Task, Unicycle, perform, plot
 from dollop.cdhmm import SubgoalHMM
 from dollop.lab import Object, Person, Scene, walks_of
 from dollop.laser import LaserLog
@@ -187,6 +189,81 @@ def test_a_cdhmm_has_its_states_steps_and_ends(ax):
     assert sorted(written) == ["0", "1", "2", "end", "start"]
     assert len(ax.texts) - len(written) == np.count_nonzero(model.transitions)
     assert labels(ax) == ["most-likely path", "states, 2 sd"]
+
+
+BOXES = np.array([[2.0, 1.0, 2.4, 1.4], [6.0, 1.0, 6.4, 1.4]])
+
+
+def learned(pauses=None):
+    """A task of one walk along the x axis and up, which waits where it is told to."""
+    x = np.r_[np.linspace(0, 6, 60), np.full(40, 6.0)]
+    walk = np.column_stack([x, np.r_[np.zeros(60), np.linspace(0.1, 4, 40)]])
+    task = Task.of(Demonstration(walk, Environment(BOXES)))
+    if pauses is None:
+        return task
+    law = replace(task.law, pauses=np.resize(pauses, len(task.law.segments) + 1))
+    return replace(task, law=law, ways=(law,))
+
+
+def written(ax):
+    """What is written into the plane."""
+    return [text.get_text() for text in ax.texts if text.get_text()]
+
+
+def test_a_task_shows_its_way_its_subgoals_and_what_it_follows(ax):
+    """The response as the law has it, a number for each subgoal and object, lines to the objects that weigh most."""
+    task = learned()
+    plot.task(ax, task)
+    (way,) = [line for line in ax.lines if line.get_label() == "way of the task"]
+    np.testing.assert_allclose(way.get_xydata(), task.law.response())
+    count = len(task.law.segments)
+    assert sorted(written(ax)) == sorted(["0", "1", *map(str, range(1, count + 1))])
+    ends = [line.get_xydata()[1] for line in ax.lines if line.get_linestyle() == ":"]
+    centres = BOXES.reshape(-1, 2, 2).mean(axis=1)
+    assert len(ends) >= count and all(np.abs(centres - end).sum(axis=1).min() < 1e-9 for end in ends)
+    assert labels(ax) == ["objects, by number", "walks shown", "follows", "way of the task", "subgoals", "start"]
+
+
+def test_waits_are_told_in_seconds(ax):
+    """A ring where the law waits, and how long; none elsewhere."""
+    plot.task(ax, learned([0.0, 2.5, 0.0, 0.0]))
+    (ring,) = [line for line in ax.lines if line.get_label() == "waits"]
+    np.testing.assert_allclose(ring.get_xydata()[0], learned().law.subgoals[0])
+    assert [text for text in written(ax) if text.endswith(" s")] == ["2.5 s"]
+
+
+def test_a_run_shows_what_it_reached_and_where_it_was_carried(ax):
+    """Subgoals that were not reached are grey; kidnappings are numbered leaps; the robot has its size."""
+    task = learned([0.0, 2.0, 0.0, 0.0])
+    background = room_map()
+    robot = Unicycle((*task.law.start, 0.0), radius=0.3)
+    done = perform(task, robot, kidnap=[(2.0, (3.0, 3.0, 0.0))], timeout=20.0)
+    plot.grid_map(ax, background)
+    plot.run(ax, done, task)
+    crosses = {line.get_label(): line.get_xydata() for line in ax.lines if line.get_label().startswith("subgoals")}
+    assert len(crosses["subgoals, reached"]) == done.reached.sum()
+    assert len(crosses["subgoals, not reached"]) == (~done.reached).sum() > 0
+    (leap,) = [line.get_xydata() for line in ax.lines if line.get_linestyle() == ":"]
+    np.testing.assert_allclose(leap[1], (3.0, 3.0), atol=1e-9)
+    (rim,) = [patch for patch in ax.patches if isinstance(patch, Circle)]
+    assert rim.radius == 0.3 and rim.center == pytest.approx(tuple(done.true_poses[-1, :2]))
+
+
+def test_a_picture_is_the_same_each_time_and_its_plane_is_true():
+    """The same bytes; equal aspect, units, and a legend that lies outside of the axes."""
+    task = learned()
+    assert plot.png(partial(plot.task, task=task)) == plot.png(partial(plot.task, task=task))
+    figure = plot.figure_of(partial(plot.task, task=task), "a task")
+    figure.canvas.draw()
+    (ax,), (legend,) = figure.axes, figure.legends
+    assert ax.get_aspect() == 1 and (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "y [m]")
+    assert not ax.get_window_extent().overlaps(legend.get_window_extent())
+
+
+def test_a_whole_map_has_floor_and_walls(ax):
+    """Free cells are pale, occupied ones grey, and both are in the legend."""
+    plot.whole_map(ax, room_map())
+    assert labels(ax) == ["occupied", "free"] and len(ax.images) == 2
 
 
 def test_the_style_ends_with_its_block():

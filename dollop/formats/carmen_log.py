@@ -5,9 +5,7 @@ A log is text, one message per line: name, contents, time of the message in s, h
 log began.
 """
 
-import gzip
 import os
-from contextlib import nullcontext
 from functools import lru_cache, partial
 
 import numpy as np
@@ -27,7 +25,7 @@ from dollop.formats.scans import (
     no_return_from,
     usable_scans,
 )
-from dollop.formats.writing import whole_file
+from dollop.formats.writing import packed, whole_file
 from dollop.laser import LaserLog
 from dollop.pose import wrapped
 
@@ -289,8 +287,9 @@ def _numbers(fields):
 def write_log(path, log):
     """Write scans as a CARMEN log of ROBOTLASER1 messages, which state the laser's geometry.
 
-    Ranges are written to 1 mm and times to 1 us, as CARMEN does (`writelog.c`); poses in full, for
-    a microradian takes a beam along a cell's border to its other side. `inf` becomes the maximum
+    Ranges are written to 1 mm and times to 1 us, as CARMEN does (`writelog.c`), but a time that is
+    finer, as those of ROS are, in full: it is read back to the last digit. So are poses, for a
+    microradian takes a beam along a cell's border to its other side. `inf` becomes the maximum
     range. The log holds the laser only: its pose stands for the robot's too.
 
     Parameters
@@ -324,26 +323,25 @@ def write_log(path, log):
         raise ValueError(f"the beams of a CARMEN log must be evenly spaced, these are up to {uneven:.3g} rad off")
     laser = " ".join(repr(float(value)) for value in (log.angles[0], fov, step, log.max_range))
     head = f"ROBOTLASER1 {UNKNOWN_TYPE} {laser} 0.001 0 {count}"
-    with whole_file(path, kind=CARMEN_LOG) as stream, _packed(stream, path) as text:
+    with whole_file(path, kind=CARMEN_LOG) as stream, packed(stream, path) as text:
         text.write(b"# CARMEN Logfile\n# distances in m, angles in rad, times in s\n")
-        for t, ranges, pose in zip(log.t, _written_ranges(log), log.poses, strict=True):
+        for t, ranges, pose in zip(log.t.tolist(), _written_ranges(log), log.poses, strict=True):
             numbers = " ".join([f"{value:.3f}" for value in ranges.tolist()])
             place = " ".join(map(repr, pose.tolist()))
-            ending = f"{place} {place} 0 0 0 0 0 {t:.6f} dollop {t - log.t[0]:.6f}"
+            ending = f"{place} {place} 0 0 0 0 0 {_written_time(t)} dollop {t - log.t[0]:.6f}"
             text.write(f"{head} {numbers} 0 {ending}\n".encode())
+
+
+def _written_time(t):
+    """A time in s as CARMEN writes it, or with as many digits as it takes to be read back."""
+    text = f"{t:.6f}"
+    return text if float(text) == t else repr(t)
 
 
 def _written_ranges(log):
     """Ranges that keep their meaning: distances stay in (0, max_range), nothing else reaches it."""
     below = (np.ceil(log.max_range * 1000 - 1e-6) - 1) / 1000
     return np.where(np.isinf(log.ranges), below + 0.001, np.clip(log.ranges, 0.001, below))
-
-
-def _packed(stream, path):
-    """The stream itself, or as gzip without name and time: the same log gives the same bytes."""
-    if str(path).endswith(".gz"):
-        return gzip.GzipFile(filename="", fileobj=stream, mode="wb", mtime=0)
-    return nullcontext(stream)
 
 
 def read_odometry(path):

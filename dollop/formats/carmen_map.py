@@ -15,9 +15,11 @@ from dollop.formats.files import (
     written_number,
 )
 from dollop.formats.kinds import CARMEN_MAP
-from dollop.formats.writing import Output, whole_file
+from dollop.formats.writing import Output, packed, whole_file
 
-__all__ = ["OCCUPIED_FROM", "outputs", "read_map", "write_map"]
+__all__ = ["OCCUPIED_FROM", "SUFFIXES", "outputs", "read_map", "write_map"]
+
+SUFFIXES = (".map", ".map.gz")
 
 OCCUPIED_FROM = 0.5
 """Probability from which a cell is occupied (`occupied_prob` in CARMEN's parameters)."""
@@ -130,7 +132,7 @@ def write_map(path, occupancy, origin, resolution):
     Parameters
     ----------
     path : str or Path
-        The file; it appears whole or not at all.
+        The file, gzipped if named `.gz`; it appears whole or not at all.
     occupancy : (H, W) float array
         Probabilities in [0, 1], NaN where unknown.
     origin : (float, float)
@@ -143,7 +145,7 @@ def write_map(path, occupancy, origin, resolution):
     chunk = b"GRIDMAP   " + struct.pack("<iif", width, height, resolution) + cells
     head = f"# Map size      : {width} x {height}\n# Resolution    : {resolution:g}\n"
     head += f"# Lower left    : {float(origin[0])!r} {float(origin[1])!r}\n"
-    with whole_file(path, kind=CARMEN_MAP) as stream:
+    with whole_file(path, kind=CARMEN_MAP) as file, packed(file, path) as stream:
         stream.write(b"# Carnegie Mellon Robot Toolkit (CARMEN) map file\n")
         stream.write(head.encode() + MAP_LABEL)
         stream.write(struct.pack("<Bi", GRIDMAP_CHUNK, len(chunk)) + chunk)

@@ -10,8 +10,9 @@ from typing import NamedTuple
 from dollop.checks import shortened
 
 __all__ = [
-    "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "PGM", "PNG", "ROS_MAP", "SCENE", "TASK", "TRAJECTORY",
-    "TRUTH", "Kind", "check_no_map_names", "check_replaceable",
+    "BAG", "CARMEN_LOG", "CARMEN_MAP", "EVERYBODY", "GIF", "PATH_TABLE", "PGM", "PNG", "ROS_MAP", "ROUTE_GRAPH",
+    "RUN", "SCENE", "TASK", "TRAJECTORY", "TRUTH", "WAYPOINTS", "Kind", "check_no_map_names", "check_replaceable",
+    "kind_of",
 ]  # fmt: skip
 
 HEAD = 1 << 16
@@ -48,9 +49,53 @@ SCENE = Kind("a scene", rb'\A\s*\{(?s:.*)"format":\s*"dollop scene"')
 TRAJECTORY = Kind("a trajectory", rb"\At,x,y,occluded\r?\n")
 EVERYBODY = Kind("a table of everybody's trajectories", rb"\At,x,y,occluded,person\r?\n")
 TRUTH = Kind("the truth of a recording", _TRUTH)
-_BAG = Kind("a ROS bag", rb"\A(?:#ROSBAG|\x89MCAP|SQLite format 3)")
+GIF = Kind("a film", rb"\AGIF8[79]a")
+RUN = Kind("a run", rb"\At,x,y,theta,true_x,true_y,true_theta,way,segment,localised,clearance,event\r?\n")
+_GRAPH = rb'\A\s*\{\s*"type": "FeatureCollection",\s*"name": "dollop route"'
+ROUTE_GRAPH = Kind("a route graph", _GRAPH)
+WAYPOINTS = Kind("waypoints", rb"\A# Dollop route: waypoints")
+PATH_TABLE = Kind("a path", rb"\A# Dollop route: way, t, x")
+BAG = Kind("a ROS bag", rb"\A(?:#ROSBAG|\x89MCAP|SQLite format 3)")
 
-_KNOWN = CARMEN_LOG, CARMEN_MAP, PGM, PNG, TASK, SCENE, TRAJECTORY, EVERYBODY, TRUTH, _BAG, ROS_MAP
+_KNOWN = (
+    CARMEN_LOG, CARMEN_MAP, PGM, PNG, GIF, TASK, SCENE, TRAJECTORY, EVERYBODY, TRUTH, RUN, ROUTE_GRAPH, WAYPOINTS,
+    PATH_TABLE, BAG, ROS_MAP,
+)  # fmt: skip
+
+
+def kind_of(path):
+    """What a file holds, told by its first 64 kB, whatever it is called.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or the folder of a ROS 2 bag.
+
+    Returns
+    -------
+    Kind or None
+        None for what none of the known kinds is.
+
+    Raises
+    ------
+    OSError
+        If there is no such file, or it cannot be read.
+
+    Examples
+    --------
+    The name says nothing.
+
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile(suffix=".log") as file:
+    ...     file.write(b"P5 1 1 255 0"), file.flush()
+    ...     kind_of(file.name).name
+    (12, None)
+    'a PGM picture'
+    """
+    if os.path.isdir(path):
+        return BAG if os.path.isfile(os.path.join(path, "metadata.yaml")) else None
+    head = _head(path)
+    return next((each for each in _KNOWN if re.search(each.pattern, head)), None)
 
 
 def check_replaceable(path, kind):
@@ -81,8 +126,9 @@ def check_replaceable(path, kind):
     head = _head(path)
     if head and not re.search(kind.pattern, head):
         rule = "remove it first, or choose another name"
-        known = (each.name for each in _KNOWN if re.search(each.pattern, head))
-        raise FileExistsError(f"it holds {next(known, 'something else')} and not {kind.name}: {rule}")
+        found = kind_of(path)
+        held = "something else" if found is None else found.name
+        raise FileExistsError(f"it holds {held} and not {kind.name}: {rule}")
 
 
 def check_no_map_names(picture, of=None):

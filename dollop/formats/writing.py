@@ -5,12 +5,13 @@ everything is on the disk. The neighbour is locked while somebody writes it: wha
 is removed by the next that writes into the folder.
 """
 
+import gzip
 import os
 import re
 import secrets
 import stat
 import time
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from functools import partial
 from pathlib import Path
@@ -24,7 +25,9 @@ try:
 except ImportError:  # a system without, such as Windows
     fcntl = None
 
-__all__ = ["Output", "check_outputs", "check_writable", "checked_path", "together", "whole_file"]
+__all__ = [
+    "Output", "check_outputs", "check_writable", "checked_path", "packed", "together", "whole_file",
+]  # fmt: skip
 
 PART = re.compile(r"\.dollop-[0-9a-f]{16}\.part")
 PATIENCE = 10.0
@@ -236,6 +239,37 @@ def whole_file(path, mode="wb", kind=None, of=None):
                 raise _naming(path, error) from None
             raise
         _GROUP.get().append(part)
+
+
+def packed(stream, path):
+    """A stream that packs what is written into it, if the file is named so.
+
+    Parameters
+    ----------
+    stream : file object
+        Of bytes.
+    path : str or Path
+        The name that the file will have.
+
+    Returns
+    -------
+    context manager
+        Of the stream itself, or, where the name ends in `.gz`, of one that packs it as gzip without
+        name and time: the same content gives the same bytes.
+
+    Examples
+    --------
+    >>> import io
+    >>> files = io.BytesIO(), io.BytesIO()
+    >>> for file in files:
+    ...     with packed(file, "room.map.gz") as stream:
+    ...         _ = stream.write(b"a room")
+    >>> files[0].getvalue() == files[1].getvalue(), gzip.decompress(files[0].getvalue())
+    (True, b'a room')
+    """
+    if str(path).endswith(".gz"):
+        return gzip.GzipFile(filename="", fileobj=stream, mode="wb", mtime=0)
+    return nullcontext(stream)
 
 
 # ---- neighbours

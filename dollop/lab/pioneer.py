@@ -126,6 +126,11 @@ class Pioneer:
         return self.localizer is None or self.localizer.localised
 
     @property
+    def accuracy(self):
+        """How far its pose may be off, in m: what localisation is accurate to, in a room of the lab."""
+        return 0.0 if self.localizer is None else 0.05
+
+    @property
     def touching(self):
         """Whether the robot is in contact with anything but the floor."""
         return bool(self.world.engine.touched(self.body) - {self.world.floor})

@@ -25,14 +25,8 @@ from dollop.checks import FARTHEST, checked_number, put_in
 from dollop.gridmap import distances_to, in_cells, in_metres
 
 __all__ = [
-    "PIONEER_AVOIDANCE",
-    "FREE_BELOW",
-    "PIONEER_RADIUS",
-    "Avoidance",
-    "Geodesic",
-    "ObstacleMap",
-    "towards",
-]
+    "CREEPING", "FREE_BELOW", "PIONEER_AVOIDANCE", "PIONEER_RADIUS", "Avoidance", "Geodesic", "ObstacleMap", "towards",
+]  # fmt: skip
 
 PIONEER_RADIUS = 0.25
 """Radius of a Pioneer 2 DX in m (ARIA, p2dx.p)."""
@@ -40,11 +34,15 @@ FREE_BELOW = 0.2
 """Occupancy below which a cell is free: most beams miss a stool's thin column in its cell."""
 OPEN_BORDER = 3.0
 """Border in m of a world without a map round all that is in it, beside the robot's diameter."""
+CREEPING = 0.05
+"""Speed in m/s of a robot that has next to no room, or comes to a place where it is to stand."""
 MOST_CELLS, COARSEST = 3_000_000, 0.5
 """Cells of a map at most, of 300 bytes each where a shortest way is looked for; and their side in m
 at most."""
-AHEAD = 6
-"""Cells of a shortest way over which its direction is taken: one alone knows eight directions."""
+DIPS = 0.01
+"""Distance in m by which there is less room half-way to a place round a corner than at both ends."""
+AHEAD = 0.3
+"""Way in m over which the direction of a shortest way is taken: one cell alone knows eight directions."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +56,8 @@ class Avoidance:
     influence : float
         Distance in m at which it sets in.
     tight : float
-        Distance in m that the shortest ways keep: a cell of most maps, for no map is more exact.
-        What is narrower is no way.
+        Distance in m that the shortest ways keep, beside what a robot's pose may be off. What is
+        narrower is no way.
     crowding : float
         How many times longer, less one, a metre counts for the shortest ways where the robot would
         touch something.
@@ -73,12 +71,12 @@ class Avoidance:
     --------
     >>> Avoidance(kept=0.6)
     Traceback (most recent call last):
-    ValueError: distances must be 0 < tight <= kept < influence, got 0.05, 0.6 and 0.5
+    ValueError: distances must be 0 < tight <= kept < influence, got 0.02, 0.6 and 0.5
     """
 
     kept: float = 0.20
     influence: float = 0.50
-    tight: float = 0.05
+    tight: float = 0.02
     crowding: float = 4.0
 
     def __post_init__(self):
@@ -89,6 +87,28 @@ class Avoidance:
         if not 0 < self.tight <= self.kept < self.influence:
             got = f"got {self.tight:g}, {self.kept:g} and {self.influence:g}"
             raise ValueError(f"distances must be 0 < tight <= kept < influence, {got}")
+
+    def beside(self, accuracy):
+        """The same for a robot whose pose may be off.
+
+        Parameters
+        ----------
+        accuracy : float
+            By so much, in m.
+
+        Returns
+        -------
+        Avoidance
+            That keeps so much more on the shortest ways, and elsewhere at least as much as there.
+
+        Examples
+        --------
+        >>> Avoidance().beside(0.05)
+        Avoidance(kept=0.2, influence=0.5, tight=0.07, crowding=4.0)
+        """
+        tight = round(self.tight + accuracy, 9)
+        kept = max(self.kept, tight)
+        return Avoidance(kept, max(self.influence, kept + self.influence - self.kept), tight, self.crowding)
 
 
 PIONEER_AVOIDANCE = Avoidance()
@@ -153,6 +173,7 @@ class ObstacleMap:
         radius=PIONEER_RADIUS,
         resolution=0.05,
         rules=PIONEER_AVOIDANCE,
+        finer=1,
     ):
         """The obstacles of an environment before a background (reconstruction).
 
@@ -177,6 +198,8 @@ class ObstacleMap:
         resolution : float
             Without a background: side of a cell in m.
         rules : Avoidance
+        finer : int
+            Into how many cells along each side those are divided, if there are not too many then.
 
         Returns
         -------
@@ -206,6 +229,8 @@ class ObstacleMap:
         else:
             blocked, side = coarser(blocked_by(background), background.resolution)
             origin, resolution = background.origin, background.resolution
+        if blocked.size * finer**2 <= MOST_CELLS:
+            blocked, side = blocked.repeat(finer, axis=0).repeat(finer, axis=1), side / finer
         distances = signed_distance(blocked, side)
         columns, rows = (np.arange(size) + 0.5 for size in blocked.shape[::-1])
         np.minimum(
@@ -254,6 +279,8 @@ class ObstacleMap:
     def cuts_corner(self, x, y, ahead_x, ahead_y):
         """Whether half-way to another place, straight on, the robot has next to no room.
 
+        Or little, and less than here and there.
+
         Parameters
         ----------
         x, y, ahead_x, ahead_y : float
@@ -263,7 +290,10 @@ class ObstacleMap:
         -------
         bool
         """
-        return self.edge((x + ahead_x) / 2, (y + ahead_y) / 2) <= self.rules.tight
+        rules, between = self.rules, self.edge((x + ahead_x) / 2, (y + ahead_y) / 2)
+        if between <= rules.tight or between > rules.kept / 3:
+            return between <= rules.tight
+        return between < min(self.edge(x, y), self.edge(ahead_x, ahead_y)) - DIPS
 
     def edges(self, positions):
         """`edge` for many places at once.
@@ -340,7 +370,7 @@ class ObstacleMap:
     def speed_limit(self, x, y, theta, deceleration, period):
         """Speed from which a robot still stops before it touches, wherever what is near may be.
 
-        One that has next to no room left may only creep, and only outwards (reconstruction).
+        Outwards or along it may always creep; with next to no room left, only so (reconstruction).
 
         Parameters
         ----------
@@ -357,9 +387,33 @@ class ObstacleMap:
             In m/s.
         """
         edge, nx, ny = self._edge_and_slope(x, y)
-        if edge <= 0.02:
-            return 0.05 if nx * cos(theta) + ny * sin(theta) > 0.05 else 0.0
-        return deceleration * (sqrt(period * period + 2 * edge / deceleration) - period)
+        left = min(self.rules.tight / 2, 0.02)
+        room, outwards = edge - left, nx * cos(theta) + ny * sin(theta)
+        speed = deceleration * (sqrt(period * period + 2 * max(room, 0.0) / deceleration) - period)
+        creeps = outwards > (0.05 if room < -left / 2 else -0.05)
+        return max(speed, CREEPING) if creeps else speed
+
+    def outwards(self, x, y, ux, uy):
+        """A direction, led off what is near where there is next to no room (reconstruction).
+
+        Parameters
+        ----------
+        x, y : float
+            Where the robot is, in m.
+        ux, uy : float
+            Unit vector.
+
+        Returns
+        -------
+        (float, float)
+            Unit vector; the same one where there is room.
+        """
+        edge, nx, ny = self._edge_and_slope(x, y)
+        if edge > self.rules.tight:
+            return ux, uy
+        nx, ny = towards(nx, ny)
+        inwards = min(nx * ux + ny * uy, 0.0)
+        return towards(ux + (1 - inwards) * nx, uy + (1 - inwards) * ny)
 
     @cached_property
     def _passable(self):
@@ -431,6 +485,38 @@ class ObstacleMap:
             if self.edge(x, y) <= -self.radius:
                 raise ValueError(f"{name} must be free, {there} in an obstacle or unknown")
 
+    def has_room(self, x, y, reach):
+        """Whether there is room for the robot near a place on the map.
+
+        Parameters
+        ----------
+        x, y : float
+            The place in m.
+        reach : float
+            How near, in m; 0: nowhere.
+
+        Returns
+        -------
+        bool
+        """
+        return reach > 0 and self.holds(x, y) and bool(self._passable[self._near((x, y), reach)].any())
+
+    def nearest_room(self, x, y):
+        """Distance to the nearest place where the robot has room.
+
+        Parameters
+        ----------
+        x, y : float
+            In m.
+
+        Returns
+        -------
+        float
+            In m, 0 where it has room.
+        """
+        cell = self._cell(x, y)
+        return 0.0 if cell == self._cell_at(x, y) else hypot(*np.subtract(self._centre(cell), (x, y)).tolist())
+
     def check_room(self):
         """Refuse a map on which there is no room for the robot anywhere.
 
@@ -489,12 +575,15 @@ class ObstacleMap:
 
     def _cell(self, x, y):
         """Flat index of the passable cell nearest to x, y in m."""
+        cell = self._cell_at(x, y)
+        return cell if self._passable.flat[cell] else self._nearest_passable[cell]
+
+    def _cell_at(self, x, y):
+        """Flat index of the cell of x, y in m, or of the one nearest to it on the border."""
         rows, columns = self.distances.shape
         across, up = in_cells(x, y, self.origin, self.resolution)
         column, row = min(max(int(across), 0), columns - 1), min(max(int(up), 0), rows - 1)
-        if self._passable[row, column]:
-            return row * columns + column
-        return self._nearest_passable[row * columns + column]
+        return row * columns + column
 
     def _centre(self, cell):
         """x, y in m of the centre of the cell with flat index `cell`."""
@@ -557,13 +646,10 @@ class Geodesic:
         cell = self.obstacles._cell(x, y)
         if self._distances[cell] == inf:
             return 0.0, 0.0
-        edge, nx, ny = self.obstacles._edge_and_slope(x, y)
-        if edge <= self.obstacles.rules.tight:  # first to where there is room, and outwards
-            ux, uy = towards(*self.obstacles._centre(cell), x, y)
-            nx, ny = towards(nx, ny)
-            return towards(ux + nx, uy + ny)
+        if self.obstacles.edge(x, y) <= self.obstacles.rules.tight:  # first to where there is room
+            return self.obstacles.outwards(x, y, *towards(*self.obstacles._centre(cell), x, y))
         cell = self._before[cell]
-        for _ in range(AHEAD - 1):
+        for _ in range(max(round(AHEAD / self.obstacles.resolution), 2) - 1):
             farther = self._before[cell]
             if self.obstacles.cuts_corner(x, y, *self.obstacles._centre(farther)):
                 break
@@ -649,5 +735,5 @@ def signed_distance(blocked, resolution):
     """Distances (H, W) in m from cells' centres to the edge of what is blocked, negative inside."""
     if not blocked.any():
         return np.full(blocked.shape, 1e3)
-    distances = distances_to(blocked) - distances_to(~blocked)
-    return resolution * (distances - np.where(blocked, -0.5, 0.5))
+    outside, inside = (distances_to(each, resolution, resolution / 2) for each in (blocked, ~blocked))
+    return outside - inside

@@ -20,6 +20,7 @@ Both drive at the speed that was shown there, and wait at a subgoal as long as t
 The paper gives neither the rule of handing over nor a controller: both are reconstructions.
 """
 
+from bisect import bisect_right
 from collections import namedtuple
 from dataclasses import dataclass
 from math import atan2, copysign, cos, dist, inf, pi, sin, sqrt
@@ -30,9 +31,10 @@ from dollop.checks import checked_number, put_in
 from dollop.law.line import Fading
 from dollop.lds import MOST_STEPS
 from dollop.pose import wrapped
-from dollop.robot.avoidance import Geodesic, towards
+from dollop.robot.avoidance import CREEPING, Geodesic, towards
 
 __all__ = [
+    "AT_END",
     "CONTROL_LAWS",
     "PIONEER_FOLLOWING",
     "PIONEER_LIMITS",
@@ -52,10 +54,10 @@ AT_ONCE = 1_000_000
 """Pairs of places that are compared at once."""
 OVER = 0.1
 """Way in m over which the direction is taken in which a law leaves its start or comes to a subgoal."""
+AT_END = 2 * STEP
+"""Distance in m from where a detour ends within which the robot has come there."""
 FACING = 0.1
 """Angle in rad within which a robot that stands looks where it should."""
-ARRIVING = 0.05
-"""Speed in m/s at which a response passes the place where it ends or waits: a robot creeps up to it."""
 
 
 @dataclass(frozen=True)
@@ -319,7 +321,7 @@ class Guidance:
         if dist(self.goals[k], here) < reach:
             return True
         near = detour is not None and dist(detour.goal, self.goals[k]) <= self._enough
-        return near and dist(detour.goal, here) < reach
+        return near and dist(detour.goal, here) < min(reach, AT_END)
 
     def shown_pace(self, k, places):
         """The speed that was shown at places of a segment, as a share of its mean.
@@ -547,6 +549,11 @@ class Supervisor:
             self.active = segment
             self.restart()
 
+    def begin(self, segment, waits, stood):
+        """Put `segment` in force, where the robot is still to wait, and has waited, as told."""
+        self.active, self.waits, self.stood = segment, waits, stood
+        self.restart()
+
     def expect_to_wait(self, place):
         """Remember to stand at the start (0) or a subgoal, if the demonstrator did and the robot has not yet."""
         left = self.guidance.pauses[place] - self.stood.get(place, 0.0)
@@ -582,7 +589,7 @@ class Supervisor:
             return inf
         return max(
             sqrt(2 * self.limits.acceleration * dist(self.guidance.goals[self.active], (x, y))),
-            ARRIVING,
+            CREEPING,
         )
 
     def safe(self, speed, x, y, theta):
@@ -650,7 +657,7 @@ class Pursuit(Supervisor):
         for k in set(self.segments) | {last}:
             mine = segments == k
             speeds[mine] = self.shown_speeds(k, places[mine])
-        speeds[self.stops(segments)] = ARRIVING
+        speeds[self.stops(segments)] = CREEPING
         self.planned = bend_speeds(places, speeds, self.limits).tolist()
 
     def stops(self, segments):
@@ -665,28 +672,44 @@ class Pursuit(Supervisor):
         if dist(self.places[self.at], (x, y)) > self.rules.stray:
             self.plan(x, y)
         if not self.waits:
+            self.came = self.came or self.guidance.reached(self.active, x, y, self.rules.reach)
             self.advance(x, y)
         if self.waits:
             return self.wait(theta)
         if self.handed_over:
             return 0.0, 0.0
         ahead = self.pursued(x, y)
-        error = wrapped(atan2(ahead[1] - y, ahead[0] - x) - theta)
+        ux, uy = towards(*ahead, x, y)
+        if self.guidance.obstacles:
+            ux, uy = self.guidance.obstacles.outwards(x, y, ux, uy)
+        error = wrapped(atan2(uy, ux) - theta)
         curvature = 2 * sin(error) / max(dist(ahead, (x, y)), STEP)
         speed = self.pace * min(self.planned[self.at], self.limits.turn / max(abs(curvature), 1e-9))
         speed = self.safe(speed, x, y, theta)
         self.expect_progress(self.end - self.at, 0)
-        if abs(error) > self.rules.sharp or speed == 0.0:
+        tight = self.most < CREEPING and abs(error) > FACING
+        if abs(error) > self.rules.sharp or speed == 0.0 or tight:
             return 0.0, self.turning(error)
         return speed, curvature * speed
 
     def pursued(self, x, y):
         """The place 0.35 m ahead, or a nearer one where going straight there would cut a corner."""
-        obstacles = self.guidance.obstacles
-        for place in self.places[self.at + self.ahead : self.at + 1 : -1]:
+        obstacles, farthest = self.guidance.obstacles, self.at + self.ahead
+        if self.active in self.guidance.detours and not self.handed_over:  # a detour is driven to its end
+            farthest = min(farthest, max(self.last_of(self.active), self.at + 1))
+        for place in self.places[farthest : self.at + 1 : -1]:
             if not obstacles or not obstacles.cuts_corner(x, y, *place):
                 return place
         return self.places[self.at + 1]
+
+    def last_of(self, k):
+        """Index of the last place of a segment that is in force."""
+        return bisect_right(self.segments, k) - 1
+
+    def restart(self):
+        """As any supervisor does, and come to the subgoal anew."""
+        super().restart()
+        self.came = False
 
     def insist(self):
         """As any supervisor does, and roll the response out anew."""
@@ -697,12 +720,17 @@ class Pursuit(Supervisor):
         """Move on to the nearest place in the look-ahead, and hand over where the response does.
 
         The whole look-ahead counts: before a sharp turn at a subgoal the next place may be farther
-        off, and those after the turn nearer.
+        off, and those after the turn nearer. No segment hands over before the robot has come within
+        reach of its subgoal.
         """
         window = range(min(self.at + self.ahead, self.end), self.at - 1, -1)
-        self.at = min(window, key=lambda i: dist(self.places[i], (x, y)))
-        if self.segments[self.at] != self.active:
-            self.hand_over(self.segments[self.at])
+        nearest = min(window, key=lambda i: dist(self.places[i], (x, y)))
+        while self.segments[nearest] > self.active and self.came:
+            self.hand_over(self.active + 1)
+            self.came = self.guidance.reached(self.active, x, y, self.rules.reach)
+        if self.segments[nearest] > self.active:
+            nearest = self.last_of(self.active)
+        self.at = nearest
         if self.at == self.end and self.guidance.reached(self.active, x, y, self.rules.reach):
             self.hand_over(self.active + 1)
 

@@ -37,6 +37,8 @@ PERIODS = 1e-3, 10.0
 """s: no motor is told more often what to do, and none is left alone for longer."""
 RADII = 1e-3, 100.0
 """m: no robot is smaller, or larger."""
+ACCURACY = 0.05
+"""m by which the pose of a robot may be off that does not say how far: as that of a localisation."""
 SOONEST = 1e-6
 """s: the shortest time-out."""
 
@@ -53,8 +55,9 @@ class Controller:
         As for `dollop.perform`.
     robot : object
         With `limits` (Limits), `period` in s and `radius` in m: that of a circle round the place that
-        its poses are of, which covers all of it. Where it has `localised`, `touching`, `noticed` or
-        `true_pose`, they are read at every step.
+        its poses are of, which covers all of it; and with `accuracy`, in m, by which its pose may be
+        off (0.05 if it does not tell). Where it has `localised`, `touching`, `noticed` or `true_pose`,
+        they are read at every step.
     control : {"pursuit", "plain"}
         Dollop's own law, or the paper's kind.
     avoid : bool
@@ -130,14 +133,16 @@ class Controller:
         held = [place for _, place in chain.from_iterable(subgoals)]
         held += [law.start for law in laws] + [place[:2] for place in places]
 
-        def chart(boxes):
-            boxes = np.vstack([task.environment.boxes, boxes])
-            return ObstacleMap.of(Environment(boxes), background, held, self._robot.radius, rules=avoidance)
+        rules = avoidance.beside(self._robot.accuracy)
+
+        def chart(boxes, finer=1):
+            environment = Environment(np.vstack([task.environment.boxes, boxes]))
+            return ObstacleMap.of(environment, background, held, self._robot.radius, rules=rules, finer=finer)
 
         self._keeper = WayKeeper(laws, shown, self._robot, control, chart, avoid, following)
-        check_some_way(subgoals, self.known)
         if avoid:
             self.known.check_room()
+        check_some_way(subgoals, self.known, self._keeper.enough if avoid else 0.0)
         self.reason, self.over = "", False
         self._notes, self._rows, self._times = self._robot.notes, [], []
         self._late = self._blind = self._leaping = 0.0
@@ -347,6 +352,8 @@ class _Body:
             text = f"the robot tells no radius: that of a Pioneer, {PIONEER_RADIUS:g} m, is taken"
             self.notes = (Note("radius", text),)
         self.radius = checked_radius(getattr(robot, "radius", PIONEER_RADIUS))
+        accuracy = getattr(robot, "accuracy", ACCURACY)
+        self.accuracy = checked_number("the robot's accuracy", accuracy, 0.0, RADII[1])
         self._known = not hasattr(robot, "localised")
         if not self._known:
             checked_flag("whether the robot is localised", robot.localised)
@@ -458,12 +465,15 @@ def named_subgoals(law):
     return [(f"subgoal {k}", place) for k, place in enumerate(law.subgoals)]
 
 
-def check_some_way(ways, obstacles):
-    """Raise ValueError, that of the first, if in every way a named subgoal is not free."""
+def check_some_way(ways, obstacles, enough):
+    """Raise ValueError, that of the first, if in every way a named subgoal is off the map or blocked.
+
+    It may lie in an obstacle if there is room for the robot within `enough` m of it.
+    """
     errors = []
     for subgoals in ways:
         try:
-            return obstacles.check_free(subgoals)
+            return obstacles.check_free([each for each in subgoals if not obstacles.has_room(*each[1], enough)])
         except ValueError as error:
             errors.append(error)
     raise errors[0]

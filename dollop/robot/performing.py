@@ -2,7 +2,8 @@
 
 A robot is anything with `pose` (x, y in m, theta in rad: what it believes), `localised` (whether it
 trusts its belief), `limits`, `period` in s, `radius` in m (of a circle round the place that its pose
-is of, which covers all of it), and `drive(v, omega)`, which lets one period pass. One that can feel
+is of, which covers all of it), and `drive(v, omega)`, which lets one period pass. It may tell by
+`accuracy` how far in m its pose may be off; 0.05 if it does not. One that can feel
 what it touches has `touching`; one that sees what its map does not have tells it by `noticed`, an
 Environment of all that it has noticed so far; a simulated one has `true_pose`, for measuring, and
 `place(pose)`, which kidnaps it. Here is a fast one for studies; `dollop.lab` has the Pioneer.
@@ -65,7 +66,7 @@ class Unicycle:
     def __init__(self, pose, limits=PIONEER_LIMITS, period=0.1, radius=PIONEER_RADIUS):
         self.limits = Limits(*checked_array("limits", limits, 4, finite=False))
         self.period = checked_number("period", period, *PERIODS)
-        self.radius = checked_radius(radius)
+        self.radius, self.accuracy = checked_radius(radius), 0.0
         self.place(pose)
 
     def place(self, pose):

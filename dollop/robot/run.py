@@ -231,12 +231,12 @@ def run_of(rows, t, clearance, keeper, robot, reason, kidnapped, notes):
     waits = np.reshape(keeper.waits(), (-1, 3))
     slack = 0.0 if np.array_equal(poses, true_poses, equal_nan=True) else ASTRAY
     apart = driven.to_subgoals()
-    reached = apart <= keeper.enough + slack
+    reached = apart <= keeper.needs() + slack
     reason = reason or driven.missed(reached, apart) or _cut_short(waits, robot.period)
     notes = (*notes, *_unknown(table, starts, clearance), *driven.notes(t))
     return Run(
         t, poses, true_poses, active, table[:, 8] > 0, clearance, not reason, reason, len(starts), kidnapped, way,
-        robot.radius, driven.done(keeper.done), reached, driven.farthest(keeper.enough), waits, notes,
+        robot.radius, driven.done(keeper.done), reached, driven.farthest(keeper.rules.reach), waits, notes,
     )  # fmt: skip
 
 

@@ -23,11 +23,13 @@ import numpy as np
 
 from dollop.checks import Note
 from dollop.robot.avoidance import Geodesic
-from dollop.robot.control import CONTROL_LAWS, PIONEER_FOLLOWING, STEP, Guidance
+from dollop.robot.control import AT_END, CONTROL_LAWS, PIONEER_FOLLOWING, STEP, Guidance
 from dollop.trajectory import distance_to_polyline
 
 __all__ = ["Way", "WayKeeper", "counterpart", "extra_length", "fitting"]
 
+FINER = 3
+"""Into how many cells along each side those of a map are divided on which no way is found."""
 SAME = 0.25
 """Distance in m within which two ways are one, and a robot stands where one begins."""
 
@@ -280,9 +282,9 @@ class WayKeeper:
             rules,
         )
         self.noticed, self.felt, self.left = np.empty((0, 4)), np.empty((0, 4)), {}
-        self.begun, self.refused, self.lines = False, "", {}
+        self.begun, self.refused, self.lines, self.finer = False, "", {}, 1
         self.remap()
-        self.enter(self.ways[0], 0)
+        self.enter(self.ways[0])
 
     @property
     def active(self):
@@ -326,8 +328,21 @@ class WayKeeper:
 
     @property
     def enough(self):
-        """Distance in m within which a robot has come to a place: of handing over, or its radius."""
+        """Float: the distance in m within which a robot must have room near a subgoal."""
         return max(self.rules.reach, self.known.radius)
+
+    def needs(self):
+        """How near the robot must come to each subgoal of the way in force.
+
+        Returns
+        -------
+        (K,) float array
+            In m: where a segment hands over, or as near as there is room.
+        """
+        goals = self.ways[self.way].law.subgoals.tolist()
+        if self.obstacles is None:
+            return np.full(len(goals), self.rules.reach)
+        return np.array([max(self.rules.reach, self.obstacles.nearest_room(*goal) + AT_END) for goal in goals])
 
     def leapt(self, x, y, now_x, now_y):
         """Whether no robot drives from one place to another in one period.
@@ -394,25 +409,41 @@ class WayKeeper:
                 return told.format(f"subgoal {k}")
         return ""
 
+    def look_closer(self):
+        """Map what is known to stand there by finer cells, between which narrower ways are found.
+
+        Returns
+        -------
+        bool
+            Whether that is new.
+        """
+        if self.finer > 1 or self.obstacles is None:
+            return False
+        self.finer = FINER
+        self.remap()
+        return True
+
     def remap(self):
         """Map what is known to stand there, and what the robot has felt."""
-        self.known = self.chart(self.noticed)
-        felt = self.chart(np.vstack([self.noticed, self.felt])) if len(self.felt) else self.known
+        self.known = self.chart(self.noticed, self.finer)
+        felt = self.chart(np.vstack([self.noticed, self.felt]), self.finer) if len(self.felt) else self.known
         self.obstacles = felt if self.avoid else None
 
-    def enter(self, way, segment):
-        """Put a way in force, from a segment on.
+    def enter(self, way, segment=None):
+        """Put a way in force, from its start or from a segment on.
 
         Parameters
         ----------
         way : Way
-        segment : int
+        segment : int, optional
         """
-        self.way, guidance = way.index, Guidance(way.law, self.obstacles, self.rules)
-        self.lines[way.index] = guidance.lines
+        guidance, waited = Guidance(way.law, self.obstacles, self.rules), None
+        if segment is not None and way.index == self.way:
+            waited = self.supervisor.waits, self.supervisor.stood
+        self.way, self.lines[way.index] = way.index, guidance.lines
         self.supervisor = CONTROL_LAWS[self.control](guidance, way.law.speeds, self.robot, self.rules)
-        if segment:
-            self.supervisor.hand_over(segment)
+        if segment is not None:
+            self.supervisor.begin(segment, *(waited or ([], {})))
 
     def command(self, x, y, theta, elapsed, standing):
         """v in m/s and omega in rad/s for a pose, on the way that fits and is free.
@@ -441,6 +472,9 @@ class WayKeeper:
         if len(self.ways) > 1 and self.hopeless and self.leave(x, y, theta, longest=inf):
             self.supervisor.elapsed, self.supervisor.standing = elapsed, standing
             command = self.supervisor.command(x, y, theta)
+        here = self.ways[self.way]
+        if self.hopeless and self.closed(here, self.active, x, y) and self.look_closer():
+            self.enter(here, self.active)
         return command, self.supervisor.most
 
     def begin(self, x, y):
@@ -457,9 +491,12 @@ class WayKeeper:
             return
         self.begun = True
         if self._has_noticed():
-            self.enter(self.ways[0], 0)
+            self.enter(self.ways[0])
         closed = [self.closed(way, 0, x, y) for way in self.ways]
         others = f", on way 0 ({len(closed) - 1} more are closed)" if len(closed) > 1 else ""
+        if all(closed) and self.look_closer():
+            closed = [self.closed(way, 0, x, y) for way in self.ways]
+            self.enter(self.ways[0])
         self.refused = closed[0] + others if all(closed) else ""
         if len(self.ways) > 1 and not self.refused:
             self._choose(x, y)
@@ -474,7 +511,7 @@ class WayKeeper:
         options = self.options(self.ways, last, x, y)
         pairs = zip(options, misfits, strict=True)
         options = [replace(each, segment=0, misfit=off) for each, off in pairs]
-        self.enter(fitting(options).way, 0)
+        self.enter(fitting(options).way)
 
     def options(self, ways, last, x, y):
         """How ways could be joined by a robot, each at the nearest place up to a last one.

@@ -4,6 +4,7 @@ import gzip
 import os
 import tempfile
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -51,11 +52,11 @@ def random_log(seed=0, scans=30, beams=19, max_range=8.191):
 
 
 def assert_equal_to_precision(read, log):
-    """The same log, to 1 mm in range and six decimals in pose and time."""
+    """The same log, to 1 mm in range; poses and times to the last digit."""
     np.testing.assert_array_equal(np.isinf(read.ranges), np.isinf(log.ranges))
     finite = np.isfinite(log.ranges)
     assert np.abs(read.ranges[finite] - log.ranges[finite]).max(initial=0) <= 0.001 + 1e-9
-    np.testing.assert_allclose(read.t, log.t, atol=1e-6)
+    np.testing.assert_array_equal(read.t, log.t)
     np.testing.assert_array_equal(read.poses, log.poses)
     np.testing.assert_allclose(read.angles, log.angles, atol=1e-12)
     assert read.max_range == log.max_range
@@ -224,6 +225,16 @@ def test_round_trip(seed, scans, beams, start, fov, max_range, suffix):
     with tempfile.TemporaryDirectory() as folder:
         carmen_log.write_log(Path(folder) / f"a{suffix}", log)
         assert_equal_to_precision(carmen_log.read_log(Path(folder) / f"a{suffix}"), log)
+
+
+def test_time_stamps_stay_those_of_the_log(tmp_path):
+    """CARMEN's microseconds are written as CARMEN writes them, ROS's nanoseconds as far as a float holds them."""
+    log = replace(random_log(scans=3), t=[976052857.267389, 1700000000.0, 1700000000.123456789])
+    carmen_log.write_log(tmp_path / "a.log", log)
+    written = [line.split()[-3] for line in (tmp_path / "a.log").read_text().splitlines()[2:]]
+    assert written == ["976052857.267389", "1700000000.000000", "1700000000.1234567"]
+    with pytest.warns(UserWarning, match="the clock jumps"):
+        np.testing.assert_array_equal(carmen_log.read_log(tmp_path / "a.log").t, log.t)
 
 
 def test_the_same_log_gives_the_same_bytes(tmp_path):

@@ -83,6 +83,16 @@ def test_a_written_map_is_read_back_in_place(tmp_path):
     assert origin == (1.5, -2.0) and resolution == 0.1
 
 
+def test_a_packed_map_is_the_plain_one(tmp_path):
+    """What `.map.gz` holds is `.map` to the last byte, without name and time, whenever it is written."""
+    occupancy = np.where(np.eye(40) > 0, 1.0, np.nan)
+    for name in ("a.map", "a.map.gz", "b.map.gz"):
+        carmen_map.write_map(tmp_path / name, occupancy, (1.5, -2.0), 0.1)
+    plain, packed, again = ((tmp_path / name).read_bytes() for name in ("a.map", "a.map.gz", "b.map.gz"))
+    assert gzip.decompress(packed) == plain and len(packed) < len(plain) / 4
+    assert packed == again and packed[3:8] == bytes(5)  # no name in it, and no time
+
+
 CORNER = b"# Lower left    : %s\n"
 
 
@@ -95,14 +105,16 @@ CORNER = b"# Lower left    : %s\n"
         (b"\n" * 70_000 + map_file(CELLS), "no CARMENMAPFILEv020 after the comment lines"),
         (map_file(CELLS, struct.pack("<Bi", 9, 0) * 2000), "no gridmap chunk among the first 1000"),
         (gzip.compress(map_file(CELLS)[:-1] + bytes(102 << 20), 1), "holds more than 81048576 bytes"),
+        (gzip.compress(map_file(CELLS))[:-9], "gzip data cut short or damaged"),
     ],
 )
 def test_maps_that_would_take_too_long_or_lie(tmp_path, content, message):
     """Corners that only Python reads, heads and chunks without end, and more cells than there is room for."""
-    (tmp_path / "a.map").write_bytes(content)
-    with pytest.raises(FormatError, match=message) as error:
-        carmen_map.read_map(tmp_path / "a.map")
-    assert len(str(error.value)) <= 300
+    for name in ("a.map", "a.map.gz"):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(FormatError, match=message) as error:
+            carmen_map.read_map(tmp_path / name)
+        assert len(str(error.value)) <= 300
 
 
 def test_a_nan_that_signals_does_not_warn(tmp_path, recwarn):

@@ -2,11 +2,14 @@
 
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from places import DATA
 
+from dollop import OccupancyGrid, observe
 from dollop.formats.files import FormatError
 from dollop.formats.logs import read_log, read_odometry, write_log
 from dollop.laser import LaserLog
@@ -107,3 +110,12 @@ def test_real_logs(name, shape, max_range, warning, kinds, recwarn):
     messages = [str(w.message) for w in recwarn]
     assert len(messages) == (warning is not None)
     assert all(warning in message for message in messages)
+
+
+def test_the_times_of_everybody_are_those_of_the_log(tmp_path):
+    """Written, read and observed, a log of Unix time keeps its stamps: none is cut, shifted or rounded."""
+    log = read_log(DATA / "slalom_0.log.gz")
+    log = replace(log, t=1_700_000_000.123456789 + log.t)
+    write_log(tmp_path / "a.log", log)
+    found = observe(read_log(tmp_path / "a.log"), OccupancyGrid.load(DATA / "lab.yaml"))
+    assert found.user is not None and all(np.isin(who.t, log.t).all() for who in (found.user, *found.people))

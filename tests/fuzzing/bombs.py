@@ -68,6 +68,7 @@ def bombs():
         "packed zeros": ("carmen log, packed", {"a.log.gz": zeros * 128}),
         "packed newlines": ("carmen log, packed", {"a.log.gz": gzip.compress(b"\n" * 2**24, 9, mtime=0) * 128}),
         "packed maps": ("carmen map", {"a.map": zeros * 128}),
+        "packed maps by their name": ("carmen map, packed", {"a.map.gz": gzip.compress(carmen, mtime=0) + zeros * 128}),
         "a packed task": ("task 1", {"a.json": gzip.compress(b" " * 2**24, 9, mtime=0) * 128}),
         "a long number": ("task 1", {"a.json": b'{"format": "dollop task", "version": 1' + b"0" * 5_000_000 + b"}"}),
         "many rows": ("worlds", {"worlds.csv": b"\n" * 5_000_000}),

@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import json
 import tempfile
 import warnings
 from collections import namedtuple
@@ -37,6 +38,7 @@ from dollop import (
     Note,
     Observer,
     OccupancyGrid,
+    Route,
     SequencedLDS,
     SubgoalHMM,
     Task,
@@ -56,6 +58,7 @@ MAY = {
     "ranges": (np.inf,), "occupancy": (np.nan,), "directions": (np.nan,), "measurements": (np.nan,),
     "probability": (np.nan,), "margin": (np.inf,), "first": (np.inf, np.nan),
     "Run.clearance": (np.inf, np.nan), "Run.poses": (np.inf, np.nan), "Run.true_poses": (np.inf, np.nan),
+    "Route.clearance": (np.inf,),
     "gate": (np.inf,), "gate_min": (np.inf,), "gate_max": (np.inf,), "disappear_after": (np.inf,),
 }  # fmt: skip
 """Fields in which other than finite numbers mean something, by what they mean."""
@@ -369,6 +372,12 @@ def calls():
             {"boxes": np.array(CANS) + 0.1, "turned": False}),
         "Task.add": Call(task.add, {"demonstration": v["shown"][1], "spread": 0.15, "matching": v["matching"]}),
         "Task.save": Call(task.save, {"path": "nowhere/a.json"}),
+        "Route.of": Call(Route.of, {"task": task, "tolerance": 0.01, "spacing": 0.5}),
+        "Route": Call(Route, {field.name: getattr(Route.of(task), field.name) for field in dataclasses.fields(Route)}),
+        "export": Call(exported, {"task": task, "path": "a.geojson", "to": "nav2"}),
+        "export of what was moved": Call(lambda subgoals, start, pauses: exported(dataclasses.replace(task, ways=(
+            dataclasses.replace(law.with_subgoals(subgoals, start), pauses=pauses),)), "a.yaml", "waypoints"),
+            {"subgoals": law.subgoals, "start": law.start, "pauses": law.pauses}),
         "Unicycle": Call(driven, {"pose": (0.4, 1.7, 0.0), "speed": 0.3, "turn": 0.1, "limits": Limits(0.5, 0.8,
             0.5, 1.57), "period": 0.1}),
         "Limits": Call(Limits, {"speed": 0.5, "turn": 0.8, "acceleration": 0.5, "turn_acceleration": 1.57}),
@@ -399,6 +408,19 @@ def learned(walk, boxes, sample_period, tolerance):
     environment = Environment(boxes)
     task = dollop.learn([Demonstration(walk, environment, sample_period, tolerance)])
     return task.law.response(), task.law.timed(), task.adapt(environment).law.response(), task
+
+
+def exported(task, path, to):
+    """A route that is written, of which nothing but a whole file is left."""
+    route = dollop.export(task, path, to)
+    if Path(path).name.endswith("json"):
+        json.loads(Path(path).read_text(), parse_constant=no_number)
+    return route
+
+
+def no_number(name):
+    """What JSON has not."""
+    raise Wrong(f"JSON has no {name}")
 
 
 def read_back(topic, fov):

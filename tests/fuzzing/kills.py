@@ -91,6 +91,11 @@ def small_task(version):
 TASKS = [small_task(version) for version in (OLD, NEW)]
 
 
+def exports(folder, version):
+    """The route graph of a task."""
+    dollop.export(TASKS[version], folder / "route.geojson", "nav2")
+
+
 def picture(path, version):
     """A picture, drawn."""
     import matplotlib.pyplot as plt
@@ -126,7 +131,7 @@ def seen(version):
 
 def quickly_observes(folder, version):
     """The same, with what was found before, and a picture that takes no time to draw."""
-    from dollop import cli
+    from dollop.cli import observing
 
     dollop.observe = lambda *_, **__: seen(version)
 
@@ -134,7 +139,7 @@ def quickly_observes(folder, version):
         with whole_file(path, kind=PNG) as stream:
             stream.write(b"\x89PNG\r\n\x1a\n%d" % version)
 
-    cli._draw_observation = draw
+    observing._draw_observation = draw
     observes(folder, version)
 
 
@@ -143,11 +148,13 @@ def library(observes=observes):
     logs, lab = (DATA / "slalom_0.log.gz", DATA / "slalom_1.log.gz"), (DATA / "lab.yaml", DATA / "lab.pgm")
     yield Writer("map .yaml", maps("room.yaml"), (("room.yaml", "room.pgm"),), logs[:1])
     yield Writer("map .map", maps("room.map"), (("room.map",),), logs[:1])
+    yield Writer("map .map.gz", maps("room.map.gz"), (("room.map.gz",),), logs[:1])
     yield Writer("observe", observes, (("user.csv", "user.png", "all.csv"),), (*logs, *lab))
     yield Writer("task", lambda folder, version: TASKS[version].save(folder / "task.json"), (("task.json",),))
     yield Writer(
         "log", lambda folder, version: dollop.write_log(folder / "a.log.gz", two_scans(version)), (("a.log.gz",),)
     )
+    yield Writer("route", exports, (("route.geojson",),))
     if find_spec(EXTRAS["lab"]):
         from dollop.lab import Recording
 

@@ -22,6 +22,7 @@ from dollop import (
     OccupancyGrid,
     Task,
     Unicycle,
+    export,
     learn,
     localise,
     observe,
@@ -255,7 +256,7 @@ def use_map(grid, path, rng):
     if localiser is not None:
         pushed(localiser.update, (0.0, 0.0, 0.0), small_scans().ranges[0])
         finite("a pose", localiser.pose, [np.nan])
-    suffix = pick(rng, (".map", ".yaml"))
+    suffix = pick(rng, (".map", ".map.gz", ".yaml"))
     again = read_again(grid.save, Path(path).with_name("again" + suffix), OccupancyGrid.load)
     if again is not None:
         check_map(again)
@@ -318,6 +319,12 @@ def use_task(task, path, rng):
     if again is not None:
         check_task(again)
         same("the subgoals", again.law.subgoals, task.law.subgoals)
+    route = pushed(export, task, Path(path).with_name("route.geojson"), "nav2")
+    if route is not None:
+        json.loads(Path(path).with_name("route.geojson").read_text(), parse_constant=float)
+        finite("the route", np.column_stack([route.places, route.headings, route.waits, route.t]))
+        if not route.deviation <= 0.01:
+            raise Wrong(f"a route is {route.deviation} m from the law")
     if rng.random() < 0.1:
         run = pushed(perform, task, Unicycle((*task.law.start, 0.0)), timeout=5.0)
         if run is not None:
@@ -517,6 +524,7 @@ KINDS = {
     "carmen log": Kind(partial(carmen_logs, ".log"), read_any_log, use_log),
     "carmen log, packed": Kind(partial(carmen_logs, ".log.gz"), read_any_log, use_log),
     "carmen map": Kind(partial(carmen_maps, ".map"), read_any_map, use_map),
+    "carmen map, packed": Kind(partial(carmen_maps, ".map.gz"), read_any_map, use_map),
     "ros map, pgm": Kind(partial(ros_maps, ".pgm"), read_any_map, use_map),
     "ros map, png": Kind(partial(ros_maps, ".png"), read_any_map, use_map),
     "task 2, anchored": Kind(partial(tasks, "anchored"), read_any_task, use_task),

@@ -261,7 +261,7 @@ def test_where_no_way_leads_through_it_gives_up_and_names_all(found):
     bare = SimpleNamespace(law=BETWEEN, ways=(BETWEEN, ROUND), shown=(3, 1), environment=Environment([]))
     run = perform(bare, Noticing(START, *found), background=background)
     assert not run.finished and run.collisions == 0
-    assert run.reason.startswith("there is no way to subgoal 0 for a robot of 0.25 m radius that keeps 0.05 m: none")
+    assert run.reason.startswith("there is no way to subgoal 0 for a robot of 0.25 m radius that keeps 0.02 m: none")
     assert ", on way 0 (way 1 is closed) at " in run.reason if found else run.reason.endswith("(1 more are closed)")
 
 

@@ -1,0 +1,75 @@
+"""Kidnappings drawn at random: when, and to which free place within reach."""
+
+import numpy as np
+import scipy
+
+from dollop.gridmap import in_metres
+from dollop.robot import ObstacleMap
+
+__all__ = ["draw_kidnappings", "reachable"]
+
+ROOM = 0.1
+"""m between the robot's edge and all that stands there, where it is put and on its way."""
+
+
+def draw_kidnappings(count, seconds, task, background, start, radius, seed):
+    """Times and poses at which a robot is put somewhere else.
+
+    Parameters
+    ----------
+    count : int
+    seconds : float
+        How long the run is that is disturbed.
+    task : Task
+        Its objects are obstacles.
+    background : OccupancyGrid
+    start : (2,) sequence of float
+        From where the places can be reached, in m.
+    radius : float
+        Of the robot, in m.
+    seed : int
+
+    Returns
+    -------
+    list of (float, (float, float, float))
+        In the order of time: s, and x, y in m, theta in rad.
+
+    Raises
+    ------
+    ValueError
+        If there is no such place.
+    """
+    rng = np.random.default_rng(seed)
+    places = reachable(ObstacleMap.of(task.environment, background, radius=radius), start)
+    if not len(places):
+        rule = f"a robot of {radius:g} m radius must have {ROOM:g} m of room somewhere"
+        raise ValueError(f"{rule} that it can drive to, to be kidnapped there")
+    chosen = places[rng.integers(len(places), size=count)]
+    poses = np.column_stack([chosen, rng.uniform(-np.pi, np.pi, count)])
+    times = np.sort(rng.uniform(0, seconds, count))
+    return list(zip(times.tolist(), map(tuple, poses.tolist()), strict=True))
+
+
+def reachable(obstacles, start):
+    """Middles of the free cells that hang together with the one nearest to a place.
+
+    Parameters
+    ----------
+    obstacles : ObstacleMap
+    start : (2,) sequence of float
+        In m.
+
+    Returns
+    -------
+    (N, 2) float array
+        In m.
+    """
+    free = obstacles.distances - obstacles.radius > ROOM
+    if not free.any():
+        return np.empty((0, 2))
+    parts, _ = scipy.ndimage.label(free)
+    rows, columns = np.nonzero(free)
+    x, y = in_metres(columns + 0.5, rows + 0.5, obstacles.origin, obstacles.resolution)
+    nearest = np.hypot(x - start[0], y - start[1]).argmin()
+    here = parts[rows, columns] == parts[rows[nearest], columns[nearest]]
+    return np.column_stack([x, y])[here]

@@ -1,0 +1,140 @@
+"""dollop perform: a simulated robot of a size performs a task."""
+
+from pathlib import Path
+
+import numpy as np
+
+import dollop
+from dollop.checks import checked_number, checked_whole
+from dollop.cli.kidnapping import draw_kidnappings
+from dollop.cli.picturing import of_run, write_picture
+from dollop.cli.telling import Result, busy, command, named, outputs_of, tell
+from dollop.cli.watching import check_kind, load_map, map_files
+from dollop.formats.kinds import GIF, PNG, RUN, TASK
+from dollop.formats.writing import Output, check_outputs, together
+from dollop.robot.tables import save_run
+
+__all__ = ["run", "verdict_of"]
+
+
+def run(options):
+    """Perform, dollop perform TASK.json --map MAP --out RUN.csv.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of the command line.
+
+    Raises
+    ------
+    ValueError
+        For a start that is not free for a robot of that radius, and what is no number.
+    """
+    out, picture, film = _outputs(options)
+    count = checked_whole("--kidnap", options.kidnap, most=MOST_KIDNAPPINGS)
+    seed = checked_whole("--seed", options.seed)
+    check_kind("TASK", options.task, [TASK], ("MAP", options.map))
+    task, background = dollop.Task.load(options.task), load_map(options.map)
+    with busy("performing"):
+        done = _performed(task, background, count, seed, options)
+    with together():
+        if film is not None:
+            from dollop.cli.filming import write_film
+
+            with busy("filming"):
+                write_film(film, done, task, background)
+        write_picture(picture, of_run(done, task, background))
+        save_run(out, done)
+    notes = tuple(dict.fromkeys((*task.notes, *done.notes)))
+    written = [each for each in (out, picture, film) if each]
+    failed = "" if done.finished else done.reason
+    tell(
+        Result(_lines(done), written, _next(done, options), notes, verdict_of(done), failed),
+        options.json,
+    )
+
+
+MOST_KIDNAPPINGS = 1000
+
+
+def _outputs(options):
+    """Paths of the run, its picture and its film, if they can be written and are no input."""
+    out, picture = outputs_of(options, ".csv", "a run")
+    outputs = [Output(out, RUN), Output(picture, PNG)]
+    film = None if options.film is None else named(options.film, ".gif", "--film", "a film")
+    outputs += [] if film is None else [Output(film, GIF)]
+    check_outputs(outputs, [options.task, *map_files(options.map, "TASK", options.task)])
+    return out, picture, film
+
+
+def _performed(task, background, count, seed, options):
+    """The run of a robot that starts where the task does, kidnapped so often."""
+    radius = checked_number("--radius", options.radius, 1e-3, 100.0)
+    start = (*task.law.start, _heading(task.law))
+    ways = {"control": options.control, "background": background, "timeout": options.timeout}
+
+    def performed(kidnap):
+        robot = dollop.Unicycle(start, options.limits, options.period, radius)
+        return dollop.perform(task, robot, kidnap=kidnap, **ways)
+
+    calm = performed(())
+    if not count:
+        return calm
+    there = start[:2], radius, seed
+    return performed(draw_kidnappings(count, calm.t[-1], task, background, *there))
+
+
+def _heading(law):
+    """In which direction a law leaves its start, in rad."""
+    if hasattr(law, "headings"):
+        return float(law.headings[0])
+    step = law.response()[1] - law.start
+    return float(np.arctan2(step[1], step[0]))
+
+
+def verdict_of(run):
+    """Whether a run was the task, for programs.
+
+    Parameters
+    ----------
+    run : Run
+
+    Returns
+    -------
+    dict
+    """
+    return {name: value for name, value in run.verdict.items() if name != "notes"}
+
+
+def _lines(run):
+    """What came of a run, for people."""
+    end = "finished" if run.finished else f"not finished: {run.reason}"
+    touched = f"touched something {run.collisions} x" if run.collisions else "touched nothing"
+    room = f"{touched}, least clearance {run.least_clearance:.2f} m"
+    return (f"{end} after {run.t[-1]:.1f} s; {room}{_share(run)}{_stood(run)}",)
+
+
+def _share(run):
+    """How much of the task a run was, for people."""
+    way = f"; {run.done:.0%} of the way, {run.reached.sum()} of {len(run.reached)} subgoals"
+    return f"{way}, at most {run.farthest:.2f} m from the response"
+
+
+def _stood(run):
+    """Which waits a run kept, for people."""
+    kept = [f"{stood:.1f} of {shown:.1f} s" for _, shown, stood in run.waits]
+    return f"; stood {', '.join(kept)}" if kept else ""
+
+
+def _next(run, options):
+    """What to do with the task that was performed."""
+    if not run.finished:
+        shown = _beside(options.out, "_shown.png")
+        return command("show", options.out, "--map", options.map, "--out", shown)
+    route = _beside(options.task, ".geojson")
+    return command("export", options.task, "--to", "nav2", "--out", route)
+
+
+def _beside(path, ending):
+    """A name beside a file's, with another ending."""
+    return Path(path).with_name(Path(path).stem + ending)
