@@ -4,8 +4,9 @@ The rooms are those of `dollop.replication.worlds`, one for each seed: the map i
 room, the task is learned from the true walks and adapted to where the objects stand afterwards, so that driving alone
 is judged. Each is performed never kidnapped and once, to a place that is free and from which there is a way.
 
-The way exists by the true outlines of all that stands there, at the floor and at the height of the laser; the margin is
-the largest in m with which it does. Touching is what the physics feel.
+The way exists by the true outlines of all that stands there, at the floor and at the height of the laser, and by the
+boxes round the objects, for the robot knows no other shape; the margin is the largest in m with which it does. Touching
+is what the physics feel.
 """
 
 from dataclasses import replace
@@ -15,6 +16,7 @@ import pandas as pd
 from scipy.ndimage import label
 
 import dollop
+from benchmarks.furnished import distance_to_boxes
 from dollop.lab import Pioneer, World, record_tour, walk_of
 from dollop.lab.outlines import outline_distances
 from dollop.replication.worlds.draw import draw
@@ -40,7 +42,9 @@ class Ground:
         low, high = np.split(np.asarray(scene.room.bounds, float), 2)
         self.x, self.y = (np.arange(a, b, STEP) for a, b in zip(low, high, strict=True))
         places = np.stack(np.meshgrid(self.x, self.y), axis=-1)
-        self.clear = self.distance(places.reshape(-1, 2)).reshape(places.shape[:2])
+        places = places.reshape(-1, 2)
+        clear = np.minimum(self.distance(places), distance_to_boxes(places, scene.boxes))
+        self.clear = clear.reshape(len(self.y), len(self.x))
 
     def distance(self, places):
         """Distances (N,) in m from places (N, 2) to walls, furniture and objects; 0 within them and outside."""
