@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 
 from dollop.checks import LATEST, Note, checked_array
+from dollop.law.timing import Stands, apart_within
 from dollop.trajectory import arc_length, check_trajectory, resample
 
 __all__ = ["Cut", "cut_laps", "laps"]
@@ -61,6 +62,8 @@ class Cut:
         How much of it was dropped before the first lap and after the last, in m.
     doubt : str
         Why a walk that seems to repeat itself was kept whole all the same; empty otherwise.
+    stood : float
+        How long on the mean somebody stood between two laps, s: at their ends, and not on the way.
     """
 
     laps: list
@@ -69,6 +72,7 @@ class Cut:
     before: float = 0.0
     after: float = 0.0
     doubt: str = ""
+    stood: float = 0.0
 
     def __repr__(self):
         return f"Cut of {self.way:.1f} m into {len(self.laps)} laps, {self.dropped:.0%} dropped"
@@ -81,11 +85,17 @@ class Cut:
     @property
     def notes(self):
         """What somebody who uses the laps must know, a tuple of `Note`; on good input none."""
+        told = []
         if self.dropped > DROPPED:
             where = f"{self.before:.1f} m before and {self.after:.1f} m after {len(self.laps)} laps"
-            told = f"{self.dropped:.0%} of the {self.way:.1f} m walked are dropped: {where}"
-            return (Note("laps", f"{told}; more than {DROPPED:.0%} is worth a look"),)
-        return (Note("laps", f"the walk is kept whole: {self.doubt}", False),) if self.doubt else ()
+            text = f"{self.dropped:.0%} of the {self.way:.1f} m walked are dropped: {where}"
+            told.append(Note("laps", f"{text}; more than {DROPPED:.0%} is worth a look"))
+        elif self.doubt:
+            told.append(Note("laps", f"the walk is kept whole: {self.doubt}", False))
+        if self.stood:
+            text = f"between two laps somebody stands for {self.stood:.1f} s on the mean"
+            told.append(Note("laps", f"{text}: laps begin and end there, it is no pause on the way", False))
+        return tuple(told)
 
 
 def laps(t, positions):
@@ -127,8 +137,9 @@ def cut_laps(t, positions):
     run beside no other lap, are dropped. The gate is a line across the track; a lap begins where
     the track crosses it in the gate's direction, about one lap after the last time, so that the
     second visit to a figure-eight's crossing opens no lap. Of all gates on the first lap the one
-    with the most laps is taken, and among those the one that is passed most narrowly. What is left
-    at head and tail is dropped, and told.
+    with the most laps is taken, among those one where nobody pauses, so that a pause is within the
+    laps, and among those the one that is passed most narrowly. What is left at head and tail is
+    dropped, and told.
 
     A walk is kept whole unless at least two full laps of one task are most of the way (60 %): one lap
     and a half show nothing twice from end to end, and who walked them may mean just that. Laps
@@ -161,11 +172,13 @@ def cut_laps(t, positions):
     [(2, 0.2), (1, 0.0)]
     """
     t, points = even_clock(t, check_trajectory(positions, "positions"))
-    cuts, doubt = lap_cuts(points)
-    walked = way(points)[0]
+    stands, walked = Stands.of(points, t[1] - t[0], "inner"), way(points)[0]
+    at = walked[np.searchsorted(stands.number, stands.rows)]
+    cuts, doubt = lap_cuts(points, at)
+    stood = between(walked[cuts], at, stands.seconds)
     parts = [points[start : end + 1] for start, end in pairwise(cuts)]
     before, after = walked[cuts[0]], walked[-1] - walked[cuts[-1]]
-    return Cut(parts, t[cuts], float(walked[-1]), float(before), float(after), doubt)
+    return Cut(parts, t[cuts], float(walked[-1]), float(before), float(after), doubt, stood)
 
 
 def even_clock(t, points):
@@ -217,14 +230,29 @@ def way(points):
     return walked, np.array(vertices)
 
 
-def lap_cuts(points):
-    """Samples of a track (N, 2) at which laps begin and the last ends, and why there are none."""
+def between(begins, at, seconds):
+    """How long on the mean in s somebody stood where laps begin, but for the first and the last place.
+
+    After so many m laps begin and the last ends (K + 1,), and after so many somebody stood (P,), for so many s.
+    """
+    inner = begins[1:-1, None]
+    if not inner.size:
+        return 0.0
+    near = np.abs(at - inner) <= apart_within(np.diff(begins).mean())
+    return float((near * seconds).sum() / len(inner))
+
+
+def lap_cuts(points, stood=()):
+    """Samples of a track (N, 2) at which laps begin and the last ends, and why there are none.
+
+    Where somebody `stood`, after so many m (P,), is no good place to cut.
+    """
     walked, vertices = way(points)
     corners = points[np.append(vertices, len(points) - 1)]
     n = max(len(points), 100)
     track, step, doubt = resample(corners, n), walked[-1] / (n - 1), ""
     for lag in islice(lap_lags(track), TRIALS):
-        cuts = cuts_at(points, walked, corners, lag * step)
+        cuts = cuts_at(points, walked, corners, lag * step, stood)
         fault, after = (
             why_too_few(walked, cuts),
             f"it seems to repeat itself after {lag * step:.1f} m",
@@ -275,8 +303,11 @@ def distances_apart(track, lag):
     return np.median(gaps), (sums[window:] - sums[:-window]).min() / window
 
 
-def cuts_at(points, walked, corners, lap):
-    """Samples at which laps of about a known length in m begin, and where the last ends."""
+def cuts_at(points, walked, corners, lap, stood=()):
+    """Samples at which laps of about a known length in m begin, and where the last ends.
+
+    Somebody `stood` after so many m (P,).
+    """
     n = int(np.ceil(min(max(len(points), 100), LAP_POINTS * walked[-1] / lap)))
     track, step = resample(corners, n), walked[-1] / (n - 1)
     lag = max(1, round(lap / step))
@@ -286,7 +317,7 @@ def cuts_at(points, walked, corners, lap):
     ends = first_run(later <= width, run), n - 1 - first_run(earlier <= width, run)
     first, last = np.searchsorted(walked, np.array(ends) * step)
     last = len(points) - 1 if ends[1] == n - 1 else last  # who stands at the end is still there
-    cuts = best_cuts(points[first : last + 1], walked[first : last + 1], lap, width)
+    cuts = best_cuts(points[first : last + 1], walked[first : last + 1], lap, width, stood)
     return [int(first + cut) for cut in cuts]
 
 
@@ -309,14 +340,17 @@ def first_run(beside, run):
     return int(np.argmax(np.convolve(beside, np.ones(run), "valid") > run - 0.5))
 
 
-def best_cuts(points, walked, lap, width):
+def best_cuts(points, walked, lap, width, stood=()):
     """Crossings of the gate with the most laps, among those of the most narrowly passed.
+
+    Where somebody `stood` after so many m (P,) is no gate if there is another with as many laps.
 
     A walk that ends a little before the gate has a last lap as well: if it is as long as others, or,
     rather than none, if it ends near the gate.
     """
+    stood, apart = np.asarray(stood) - walked[0], apart_within(lap)
     end, walked = len(points) - 1, walked - walked[0]
-    best, best_rank = [0, end], (2, True, -np.inf)
+    best, best_rank = [0, end], (2, True, False, -np.inf)
     gates = np.flatnonzero(walked < lap)
     for gate in gates[:: -(-len(gates) // GATES)]:
         found = gate_crossings(points, walked, gate, lap, width)
@@ -326,7 +360,8 @@ def best_cuts(points, walked, lap, width):
         nearly = not full and near and abs(rest - lap) < LAP_SPREAD * lap
         found = [*found, end] if full or nearly else found
         narrow = -np.linalg.norm(points[found] - points[gate], axis=1).max()
-        rank = len(found), not nearly, narrow
+        passed = not (np.abs(walked[found] - stood[:, None]) <= apart).any()
+        rank = len(found), not nearly, passed, narrow
         best, best_rank = (found, rank) if rank >= best_rank else (best, best_rank)
     return best
 

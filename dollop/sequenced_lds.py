@@ -17,16 +17,18 @@ from dollop.checks import (
     put_in,
 )
 from dollop.law.line import check_ends, lines_of
+from dollop.law.pauses import on_cuts, shown_pauses
 from dollop.law.timing import (
     CORNER,
+    OVER,
     SOONEST,
     Stands,
-    shown_pauses,
     shown_profile,
     times_along,
     turns_at,
 )
 from dollop.lds import LDS, MOST_STEPS, Statistics
+from dollop.pose import wrapped
 from dollop.segmentation import (
     best_segments,
     cuts_within,
@@ -38,6 +40,7 @@ from dollop.segmentation import (
 from dollop.trajectory import (
     align,
     arc_length,
+    at_arc_length,
     check_one_way,
     check_trajectories,
     check_trajectory,
@@ -45,7 +48,7 @@ from dollop.trajectory import (
     resample,
 )
 
-__all__ = ["LEAST_REACH", "PERIODS", "SequencedLDS", "check_times"]
+__all__ = ["LEAST_REACH", "LONGEST_PAUSE", "PERIODS", "SequencedLDS", "check_times"]
 
 LEAST_REACH = 1e-6  # m: nearer to a subgoal than coordinates can tell, none would ever arrive
 REACH = 0.01  # m, to which lines are rolled out
@@ -130,6 +133,33 @@ class SequencedLDS:
         """(K, 2) float array: where the segments end, m."""
         return np.array([segment.goal for segment in self.segments])
 
+    @property
+    def headings(self):
+        """(K + 1,) float array: where the law leads at the start, and at each subgoal as it arrives, rad.
+
+        In (-pi, pi], over a decimetre of `lines`. A laser cannot tell where somebody who stands looks:
+        this is the direction of the walk.
+
+        Examples
+        --------
+        Two metres along x, one along y:
+
+        >>> corner = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]]
+        >>> law = SequencedLDS.fit(resample(corner, 61))
+        >>> np.degrees(law.headings[[0, -1]]).round() + 0.0
+        array([ 0., 90.])
+        """
+        lines = [line.places for line in self.lines()]
+        ends = [arc_length(line)[-1] for line in lines]
+        spans = [
+            (lines[0], 0.0, OVER),
+            *((line, end - OVER, end) for line, end in zip(lines, ends, strict=True)),
+        ]
+        x, y = np.array([np.diff(at_arc_length(line, (a, b)), axis=0)[0] for line, a, b in spans]).T
+        moved = np.hypot(x, y) > LEAST_REACH
+        known = np.maximum.accumulate(np.where(moved, np.arange(len(x)), 0))  # who stays has come as before
+        return wrapped(np.arctan2(y, x))[known]
+
     @classmethod
     def fit(
         cls,
@@ -192,15 +222,47 @@ class SequencedLDS:
         (1, array([[0., 1.]]))
         """
         given = tolerance, n_segments, sample_period, candidates
+        _, _, period, _ = checked_search(*given)
+        stands = [Stands.of(walk, period) for walk in check_trajectories(trajectories)]
+        return cls.fit_stands(stands, tolerance, n_segments, retimed, sample_period, candidates)
+
+    @classmethod
+    def fit_stands(
+        cls,
+        stands,
+        tolerance=0.02,
+        n_segments=None,
+        retimed=True,
+        sample_period=0.1,
+        candidates=100,
+    ):
+        """The same, for walks of which it is known where somebody stood (beyond the paper).
+
+        Parameters
+        ----------
+        stands : sequence of Stands
+            Of each walk.
+        tolerance, n_segments, retimed, sample_period, candidates
+            As for `fit`.
+
+        Returns
+        -------
+        SequencedLDS
+
+        Raises
+        ------
+        ValueError
+            As `fit`.
+        """
+        given = tolerance, n_segments, sample_period, candidates
         tolerance, n_segments, sample_period, candidates = checked_search(*given)
         retimed = checked_flag("retimed", retimed)
-        stands = [Stands.of(walk, sample_period) for walk in check_trajectories(trajectories)]
         walks = [each.walk for each in stands]
         aligned, shares = align(walks, 2 * candidates - 1)
         check_one_way(walks, aligned)
+        pauses, aligned, shares = cut_at_pauses(stands, aligned, shares)
         path, moments = aligned.mean(axis=0)[::2], cut_moments(walks, shares[:, ::2])
         statistics = retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
-        pauses = shown_pauses(stands, shares[:, ::2], arc_length(path)[-1])
         division = Division(path, statistics, pauses)
         cuts = division.exactly(n_segments) if n_segments is not None else division.within(tolerance)
         at = moments[:, cuts]
@@ -232,6 +294,30 @@ class SequencedLDS:
         """
         profile = shown_profile(walks, moments, np.array(lengths), sample_period)
         return replace(self, pauses=pauses, corners=corners, profile=profile)
+
+    def without_waits_at_ends(self):
+        """The same law, for a task: what was waited before the first step and after the last is none of it.
+
+        A recording begins before the walk and ends after it, by whoever makes it; how long somebody
+        stands there says nothing of the task.
+
+        Returns
+        -------
+        SequencedLDS
+            Without pauses at start and last subgoal.
+
+        Examples
+        --------
+        >>> x = np.concatenate([np.zeros(30), np.arange(0, 3, 0.1)])
+        >>> law = SequencedLDS.fit(np.column_stack([x, 0 * x]))
+        >>> law.pauses.round(6), law.without_waits_at_ends().pauses
+        (array([3., 0.]), array([0., 0.]))
+        """
+        if self.pauses is None:
+            return self
+        pauses = self.pauses.copy()
+        pauses[[0, -1]] = 0.0
+        return replace(self, pauses=pauses)
 
     def lines(self, reach=0.01):
         """What each segment keeps to: the response of its LDS from the subgoal before.
@@ -667,6 +753,26 @@ class Division:
         turns = turns_at(whole, np.cumsum([line.way[-1] for line in lines]))
         turned = np.where(corners, 0, turns - self.turns(cuts)) / TURNED
         return np.maximum(np.where(total > 1, each, np.minimum(each, 1)), turned)
+
+
+def cut_at_pauses(stands, aligned, shares):
+    """Seconds stood by candidate cut, and aligned walks (K, 2 C - 1, 2) and shares (K, 2 C - 1) with cuts there.
+
+    As they are where nobody pauses on the way.
+    """
+    length, count = arc_length(aligned.mean(axis=0)[::2])[-1], aligned.shape[1] // 2 + 1
+    seconds, moved = on_cuts(shown_pauses(stands, shares[:, ::2], length), count)
+    if (moved == np.arange(count)).all():
+        return seconds, aligned, shares
+    fine = np.arange(2 * count - 1)
+    moved = 2 * np.interp(fine / 2, np.arange(count), moved)
+    shares = np.stack([np.interp(moved, fine, share) for share in shares])
+    pairs = zip((each.walk for each in stands), shares, strict=True)
+    return (
+        seconds,
+        np.stack([at_arc_length(walk, share * arc_length(walk)[-1]) for walk, share in pairs]),
+        shares,
+    )
 
 
 def cut_moments(walks, shares):

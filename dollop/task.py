@@ -25,6 +25,7 @@ from dollop.formats.files import check_json
 from dollop.formats.kinds import TASK
 from dollop.formats.writing import whole_file
 from dollop.laps import cut_laps
+from dollop.law.timing import Stands
 from dollop.learning.anchored import learn_anchored, tied_to_corners, told_of_places
 from dollop.learning.matchings import composed, inverse, matched_to, matchings_into, notes_of
 from dollop.learning.paper import anchors, learn_as_paper
@@ -121,6 +122,14 @@ class Demonstration:
     def walks(self):
         """The walks as a list of (N_k, 2) float arrays, in m."""
         return check_trajectories(self.trajectory)
+
+    @cached_property
+    def stands(self):
+        """The walks without their pauses, and where those were: a list of `dollop.law.timing.Stands`.
+
+        Who stands at an end of a walk waits for the recording; that is no pause of the task.
+        """
+        return [Stands.of(walk, self.sample_period, "inner") for walk in self.walks]
 
     @cached_property
     def law(self):
@@ -286,7 +295,7 @@ class Task:
         environment, shown = demonstration.environment, (demonstration,)
         partners = (np.arange(len(environment)),)
         if method == "paper":
-            law = demonstration.law
+            law = demonstration.law.without_waits_at_ends()
             tied = associate(anchors(law), environment, m=max(1, len(environment.corners)))
             return cls(law, environment, tied, None, shown, notes_of(shown), partners=partners)
         ways, _, notes = learn_anchored(shown, partners, environment, merged=False)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from walks import walk_figure_eights
 
 from dollop.laps import DROPPED, cut_laps, laps
+from dollop.law.timing import Stands
 from dollop.trajectory import arc_length
 
 
@@ -240,3 +241,29 @@ def test_a_clock_of_gaps_is_refused():
         laps(np.append(clock[:-1], 1e9), track)
     with pytest.raises(ValueError, match="^t"):
         laps(np.append(clock[:-1], np.inf), track)
+
+
+def stood_in_laps(place, n=4, seconds=6.0):
+    """Times and positions of n figure-eights of 200 samples each, which stand at a place of every lap but the first."""
+    track = eight(n, 200 * n)
+    rows = [row for row in range(place, 200 * n, 200) if row]
+    repeats = np.ones(len(track), int)
+    repeats[rows] = round(seconds / 0.1)
+    walk = np.repeat(track, repeats, axis=0)
+    return 0.1 * np.arange(len(walk)), walk + np.random.default_rng(0).normal(0, 0.005, walk.shape)
+
+
+@pytest.mark.parametrize("place", [30, 77, 120, 170])
+def test_a_pause_in_every_lap_is_within_the_laps(place):
+    """Wherever it is, no lap begins there: each stands once, on its way."""
+    cut = cut_laps(*stood_in_laps(place))
+    assert len(cut.laps) >= 3 and cut.stood == 0 and not [note for note in cut.notes if "stands" in note.text]
+    assert [Stands.of(lap, 0.1, "inner").seconds.round() for lap in cut.laps] == [[6.0]] * len(cut.laps)
+
+
+def test_a_pause_where_all_laps_begin_is_told():
+    """Who stands only where every full lap begins stands between laps: a note tells how long, and doubts nothing."""
+    cut = cut_laps(*stood_in_laps(0))
+    assert len(cut.laps) == 4 and cut.stood == pytest.approx(6.0, abs=0.3)
+    [note] = cut.notes
+    assert note.kind == "laps" and "stands for" in note.text and not note.doubt

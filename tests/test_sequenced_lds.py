@@ -173,6 +173,41 @@ def test_handwritten_letters_are_drawn(letter):
     assert law.error(mean_trajectory(walks)) < 0.01
 
 
+# Headings
+
+
+def test_headings_are_those_of_the_walk():
+    """On a circle, to 5 degrees: ahead at the start, and along it at every subgoal."""
+    turn = np.linspace(0, 1.5 * np.pi, 200)
+    law = SequencedLDS.fit(2 * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    places = np.vstack([law.start, law.subgoals])
+    along = np.arctan2(places[:, 1], places[:, 0]) + np.pi / 2
+    assert law.headings.shape == (len(law.segments) + 1,)
+    assert np.abs(np.exp(1j * law.headings) - np.exp(1j * along)).max() < np.radians(5)
+    assert (law.headings > -np.pi).all() and (law.headings <= np.pi).all()
+
+
+@settings(max_examples=20)
+@given(st.floats(-10, 10))
+def test_headings_turn_with_the_lab(law, angle):
+    """And stay in (-pi, pi]; straight back is pi."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, -s], [s, c]])
+    moved = law.with_subgoals(law.subgoals @ turn.T, turn @ law.start, turned=True)
+    away = np.exp(1j * (moved.headings - law.headings - angle))
+    assert np.abs(np.angle(away)).max() < 1e-3
+    assert (moved.headings > -np.pi).all() and (moved.headings <= np.pi).all()
+    back = SequencedLDS.fit(np.linspace([3.0, 0.0], [0.0, 0.0], 40))
+    assert back.headings.tolist() == pytest.approx([np.pi, np.pi])
+
+
+def test_a_segment_that_leads_nowhere_keeps_the_heading():
+    """A subgoal where the one before is: whoever is there has come as before."""
+    straight = SequencedLDS.fit(np.linspace([0.0, 0.0], [0.0, 3.0], 40))
+    twice = SequencedLDS(straight.segments * 2, straight.start, np.ones(2))
+    assert twice.headings == pytest.approx(np.full(3, np.pi / 2))
+
+
 # Bad input
 
 

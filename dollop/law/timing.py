@@ -1,21 +1,43 @@
-"""When a demonstrator was where: pauses, and the speed along each segment (beyond the paper)."""
+"""When a demonstrator was where: stands, and the speed along each segment (beyond the paper)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.ndimage import correlate1d, maximum_filter1d, uniform_filter1d
 
 from dollop.trajectory import arc_length, at_arc_length
 
-__all__ = ["CORNER", "PARTS", "SOONEST", "Stands", "shown_pauses", "shown_profile", "times_along", "turns_at"]
+__all__ = [
+    "CORNER",
+    "OVER",
+    "PARTS",
+    "SHARE",
+    "SOONEST",
+    "Stands",
+    "apart_within",
+    "shown_profile",
+    "times_along",
+    "turns_at",
+]
 
 STILL, LEAST = 0.05, 1.0
 """Who stays within so many metres of a place for so many seconds stands there."""
 SLOW = 0.25
 """Nobody stands who is faster than this share of the walk's own mean speed: a path without times, of
 which no sample period is known, is not taken for a pause."""
-APART = 0.5
-"""Way in m over which stands of several walks are one pause."""
+QUIET, NOISY = 0.01, 0.03
+"""m: scatter of the samples along each axis that is small beside `STILL`, and the most that is allowed for:
+a laser's track of somebody who stands scatters by 0.5 cm, and by some centimetres where it is seen badly."""
+GONE = 0.2
+"""m: who has not been so far away between two stands has not gone; it is less than the length of a foot."""
+CREEP = 1e-3
+"""m: two samples of a place are no nearer to each other."""
+ROUNDS = 3
+"""How often a middle is sought anew: then it hardly moves any more."""
+APART, SHARE = 0.5, 0.1
+"""Way in m, or share of a shorter walk, over which stands of one walk are one pause, and within which of an
+end they are at that end: a step is longer. Stands of several walks are one pause over that share of the way:
+so far walks among objects that have moved slip along each other."""
 PARTS = 16
 """Parts of a segment, each of which has its speed: a person speeds up within a metre, and a segment
 is about three metres long."""
@@ -38,14 +60,23 @@ class Stands:
         Which samples.
     seconds : (P,) float array
         How long each lasted.
+    inner : (P,) bool array
+        Which of them are on the way, and not at an end of the walk (see `apart_within`).
+    number : (M,) int array
+        For each sample with the pauses which one it is without.
+    pooled : bool
+        Whether the inner ones are those that all walks of a way have in common, in order.
     """
 
     walk: np.ndarray
     rows: np.ndarray
     seconds: np.ndarray
+    inner: np.ndarray
+    number: np.ndarray
+    pooled: bool = False
 
     @classmethod
-    def of(cls, walk, period):
+    def of(cls, walk, period, which="all"):
         """Take the pauses out of a walk.
 
         Parameters
@@ -54,6 +85,9 @@ class Stands:
             m.
         period : float
             Time between samples in s.
+        which : {"all", "inner", "ends"}
+            All; or those that are half a metre of the way and more from both its ends, or a tenth of
+            a shorter one; or only the others.
 
         Returns
         -------
@@ -69,22 +103,109 @@ class Stands:
         >>> stands.seconds.round(6), stands.walk[stands.rows]
         (array([2.1]), array([[1., 0.]]))
         """
-        spans = [_narrowed(walk, *span) for span in _still(walk, period)]
-        spans = [(a, b) for a, b in spans if (b - a) * period >= LEAST]
+        spans = _spans(walk, period)
+        found = cls._without(walk, spans, period)
+        if which == "all" or not len(found.rows):
+            return found
+        chosen = found.inner == (which == "inner")
+        found = cls._without(walk, [span for span, of in zip(spans, chosen, strict=True) if of], period)
+        return replace(found, inner=np.full(len(found.rows), which == "inner"))
+
+    @classmethod
+    def known(cls, walk, period, rows, seconds):
+        """A walk of which it is known where somebody stood, but for its ends.
+
+        Parameters
+        ----------
+        walk : (N, 2) float array
+            m; without the pauses that are known.
+        period : float
+            Time between samples in s.
+        rows : (P,) int array
+            At which samples they were, in order.
+        seconds : (P,) float array
+            How long each lasted.
+
+        Returns
+        -------
+        Stands
+            Of those, and of the stands that the walk has at its ends.
+        """
+        ends, rows = cls.of(walk, period, "ends"), np.asarray(rows, int)
+        rows, seconds = (
+            np.concatenate([ends.rows, ends.number[rows]]),
+            np.concatenate([ends.seconds, seconds]),
+        )
+        inner, order = np.arange(len(rows)) >= len(ends.rows), np.argsort(rows, kind="stable")
+        return cls(ends.walk, rows[order], seconds[order], inner[order], ends.number, pooled=True)
+
+    def of_walk(self, values):
+        """What belongs to the samples that are left, of what belongs to those with the pauses.
+
+        Parameters
+        ----------
+        values : (M, ...) array
+
+        Returns
+        -------
+        (N, ...) array
+            Of each sample in which somebody stood the first.
+        """
+        return values[np.unique(self.number, return_index=True)[1]]
+
+    @classmethod
+    def _without(cls, walk, spans, period):
+        """The walk without spans (first, last)."""
         kept = np.ones(len(walk), bool)
         places = walk.copy()
         for first, last in spans:
             places[first] = walk[first : last + 1].mean(axis=0)
             kept[first + 1 : last + 1] = False
-        if kept.sum() < 3 or not (places[kept] != places[kept][0]).any():
-            return cls(walk, np.zeros(0, int), np.zeros(0))
-        rows = np.cumsum(kept)[[first for first, _ in spans]] - 1
-        return cls(places[kept], rows, period * np.array([b - a for a, b in spans], float))
+        if not spans or kept.sum() < 3 or not (places[kept] != places[kept][0]).any():
+            none = np.zeros(0)
+            return cls(walk, none.astype(int), none, none.astype(bool), np.arange(len(walk)))
+        number, places = np.cumsum(kept) - 1, places[kept]
+        rows, seconds = number[[first for first, _ in spans]], [period * (b - a) for a, b in spans]
+        way = arc_length(places)
+        at, apart = way[rows], apart_within(way[-1])
+        return cls(places, rows, np.array(seconds), (at > apart) & (at < way[-1] - apart), number)
+
+
+def apart_within(length):
+    """How much of a way is one place where somebody stands.
+
+    Parameters
+    ----------
+    length : float
+        Of the way, m.
+
+    Returns
+    -------
+    float
+        m.
+
+    Examples
+    --------
+    >>> apart_within(12.0), apart_within(1.0)
+    (0.5, 0.1)
+    """
+    return min(APART, SHARE * length)
+
+
+def _spans(walk, period):
+    """Spans (first, last) of samples in which somebody stands."""
+    spans = [_narrowed(walk, *span, _width(period)) for span in _unbroken(walk, _still(walk, period))]
+    return [(a, b) for a, b in spans if (b - a) * period >= LEAST]
+
+
+def _width(period):
+    """Samples that last as long as the shortest stand, at least."""
+    return int(np.ceil(LEAST / period - 1e-9)) + 1
 
 
 def _still(walk, period):
     """Spans (first, last) of samples that all belong to some window in which the walk stands."""
-    width = int(min(np.ceil(LEAST / period - 1e-9), len(walk))) + 1
+    width = min(_width(period), len(walk) + 1)
     speed = arc_length(walk)[-1] / (len(walk) * period)
     radius = min(STILL, SLOW * speed * LEAST)
     if width > len(walk):
@@ -92,7 +213,11 @@ def _still(walk, period):
     # Who walks 2 r evenly scatters by r / sqrt(3) about the middle, whichever way he walks.
     centred = walk - walk.mean(axis=0)
     first, second = (uniform_filter1d(each, width, axis=0) for each in (centred, centred**2))
-    middle = (second - first**2).sum(axis=1) <= radius**2 / 3
+    middle = (second - first**2).sum(axis=1) <= radius**2 / 3 + 2 * _noise(walk)
+    # Noise hides a slow step, but not where the window leads to.
+    steps = np.arange(width) - (width - 1) / 2
+    slope = correlate1d(centred, steps / (steps**2).sum(), axis=0)
+    middle &= np.hypot(*slope.T) <= 2 * radius / LEAST * period
     middle[: width // 2] = middle[len(walk) - (width - 1) // 2 :] = False  # no whole window
     origin = -1 if width % 2 == 0 else 0
     still = maximum_filter1d(middle.astype(np.int8), width, mode="constant", origin=origin)
@@ -100,51 +225,57 @@ def _still(walk, period):
     return list(zip(edges[::2], edges[1::2] - 1, strict=True))
 
 
-def _narrowed(walk, first, last):
-    """The span without the steps before and behind: within the radius of the place itself."""
-    samples = walk[first : last + 1]
-    near = np.flatnonzero(np.hypot(*(samples - samples.mean(axis=0)).T) <= STILL)
-    return (first + near[0], first + near[-1]) if len(near) else (first, first)
+def _unbroken(walk, spans):
+    """Spans in order, where those are one between which nobody has gone."""
+    joined = []
+    for first, last in spans:
+        before = joined[-1] if joined else (first, last)
+        places = [walk[a : b + 1].mean(axis=0) for a, b in (before, (first, last))]
+        between = walk[before[1] : first + 1]
+        gone = max(np.hypot(*(between - place).T).max(initial=0) for place in places)
+        if joined and gone <= GONE:
+            first = joined.pop()[0]
+        joined.append((first, last))
+    return joined
 
 
-def shown_pauses(stands, shares, count):
-    """Where and how long the walks stood, pooled.
+def _noise(walk):
+    """Variance in m^2 along each axis of what the samples of a walk scatter, beyond what is small.
 
-    Parameters
-    ----------
-    stands : sequence of K Stands
-    shares : (K, C) float array
-        Shares of each walk's way, rising from 0 to 1, at which it may be cut (see `align`).
-    count : float
-        The mean length of the walks, m.
-
-    Returns
-    -------
-    dict of int to float
-        For a candidate cut the mean pause in s, where at least half of the walks stood.
+    Noise of standard deviation s has second differences of median length sqrt(6 ln 4) s.
     """
-    found = []
-    for k, each in enumerate(stands):
-        way = arc_length(each.walk)
-        at = np.interp(way[each.rows] / way[-1], shares[k], np.arange(shares.shape[1]))
-        found += zip(at, each.seconds, [k] * len(at), strict=True)
-    pauses, apart = {}, max(APART / count * (shares.shape[1] - 1), 2.0)
-    for group in _grouped(sorted(found), apart):
-        at, seconds, walks = map(np.array, zip(*group, strict=True))
-        if len(set(walks)) >= len(stands) / 2:
-            pauses[round(at.mean())] = float(seconds.sum() / len(stands))
-    return pauses
+    bends = np.hypot(*np.diff(walk, 2, axis=0).T)
+    scatter = min(np.median(bends) / np.sqrt(6 * np.log(4)), NOISY) if len(bends) else 0.0
+    return max(scatter**2 - QUIET**2, 0.0)
 
 
-def _grouped(found, apart):
-    """Sorted tuples in groups, in each of which the first entries are at most so far from the first."""
-    groups = []
-    for each in found:
-        if groups and each[0] - groups[-1][0][0] <= apart:
-            groups[-1].append(each)
-        else:
-            groups.append([each])
-    return groups
+def _narrowed(walk, first, last, width):
+    """The span without the steps before and behind: within the scatter of the place itself.
+
+    Of Gaussian scatter 94 % lie within twice the median distance. At the ends of a walk, where a
+    stand has no length of its own, it is all that is within the radius.
+    """
+    samples = walk[first : last + 1]
+    if first == 0 or last == len(walk) - 1:
+        near = np.flatnonzero(np.hypot(*(samples - samples.mean(axis=0)).T) <= STILL)
+        return (first + near[0], first + near[-1]) if len(near) else (first, first)
+    begins, ends = _of_the_place(samples[: 2 * width]), _of_the_place(samples[-2 * width :])
+    return first + begins[0], last + 1 - len(samples[-2 * width :]) + ends[-1]
+
+
+def _of_the_place(samples):
+    """Which of some samples (N, 2) are not steps to or from the place where most of them are."""
+    away = np.hypot(*(samples - _middle(samples)).T)
+    return np.flatnonzero(away <= np.clip(2 * np.median(away), CREEP, STILL))
+
+
+def _middle(samples):
+    """Where most of some samples (N, 2) are: the mean of those that are not farther than half of them."""
+    middle = samples.mean(axis=0)
+    for _ in range(ROUNDS):
+        away = np.hypot(*(samples - middle).T)
+        middle = samples[away <= np.median(away)].mean(axis=0)
+    return middle
 
 
 def turns_at(path, ways):

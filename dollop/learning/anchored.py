@@ -54,7 +54,7 @@ def learn_anchored(demonstrations, partners, environment, spread=None, merged=Tr
     corners = environment.corner_offsets.reshape(-1, 4, 2)
     frames = frames_of([each.environment for each in shown], goes, corners)
     home = frames_like(frames.objects, frames.turning, environment, np.arange(len(environment)))
-    curves = [curve_of(each.walks) for each in shown]
+    curves = [curve_of(_without_pauses(each)) for each in shown]
     found = divided(np.array([curve for curve, _ in curves]), frames)
     ways, notes, mapped = [], [], [None] * len(shown)
     for members, laid in found:
@@ -67,6 +67,11 @@ def learn_anchored(demonstrations, partners, environment, spread=None, merged=Tr
     notes += _told_of_ways(ways)
     model = SubgoalHMM.fit(mapped, spread) if merged else None
     return tuple(ways), model, notes
+
+
+def _without_pauses(shown):
+    """The walks of a demonstration: who stands, and sways, comes no farther."""
+    return [each.walk for each in shown.stands]
 
 
 def _at_home(laid, frames, home, shown, curves, members):

@@ -1,5 +1,6 @@
 """Learning as the paper has it: map every demonstration to one environment first, then merge (Sec. IV-B and V)."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -109,14 +110,42 @@ def shared_law(laws, members, places):
     Returns
     -------
     SequencedLDS
-        Of K segments.
+        Of K segments. It waits at a subgoal for the mean of the times that were waited there, if half
+        of the demonstrations did.
     """
     segments, speeds = [], []
     for shared, goal in zip(members, places[1:], strict=True):
         first, *others = [laws[d].segments[i].statistics for d, i in shared]
         segments.append(LDS(sum(others, first), goal))
         speeds.append(np.mean([laws[d].speeds[i] for d, i in shared]))
-    return SequencedLDS(tuple(segments), places[0], np.array(speeds))
+    law, pauses = (
+        SequencedLDS(tuple(segments), places[0], np.array(speeds)),
+        shared_pauses(laws, members),
+    )
+    return replace(law, pauses=pauses, corners=pauses[1:] > 0) if pauses.any() else law
+
+
+def shared_pauses(laws, members):
+    """How long a law waits at its start and at each of its subgoals (beyond the paper).
+
+    Parameters
+    ----------
+    laws : sequence of SequencedLDS
+        Of each demonstration.
+    members : list of K lists of (demonstration, segment)
+
+    Returns
+    -------
+    (K + 1,) float array
+        In s: the mean over the demonstrations that have the subgoal, where at least half of them
+        waited there; 0 at both ends.
+    """
+    pauses = [each.without_waits_at_ends().pauses for each in laws]
+    shared = np.zeros(len(members) + 1)
+    for k, along in enumerate(members[:-1], start=1):
+        waited = np.array([pauses[d][i + 1] for d, i in along])
+        shared[k] = waited.mean() if np.mean(waited > 0) >= 0.5 else 0.0
+    return shared
 
 
 def tie_to_objects(environment, demonstrations, centres, members):

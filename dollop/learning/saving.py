@@ -41,6 +41,8 @@ TASK = *ALWAYS, "method", "environment", "objects", "partners", "notes"
 SHOWN = "walks", "sample_period", "tolerance"
 WAY = (*SHOWN, "shares", "home", "weights", "local", "objects", "turning", "members", "covered")
 """What there must be in a file, and in its parts."""
+TIMING = "pauses", "corners", "profile"
+"""What there is in a file only where somebody paused: without it versions before this one read it too."""
 
 
 def as_dict(task):
@@ -78,7 +80,10 @@ def as_dict(task):
 
 def _of_law(task):
     law, tied = task.law, task.association
-    return {
+    waits = law.pauses is not None and law.pauses.any()
+    timing = {name: getattr(law, name) for name in TIMING} if waits else {}
+    content = {name: value for name, value in timing.items() if value is not None}
+    return content | {
         "start": law.start,
         "speeds": law.speeds,
         "segments": [{"goal": each.goal, **asdict(each.statistics)} for each in law.segments],
@@ -98,6 +103,7 @@ def _of_way(way):
         "tolerance",
     )
     content = {name: getattr(way, name) for name in names}
+    content |= {"pauses": way.pauses} if len(way.pauses) else {}
     return content | {
         "walks": list(way.walks),
         "shares": list(way.shares),
@@ -165,7 +171,7 @@ def _task_of(content, make_task, make_demonstration, laid_out):
         content = _as_version_2(content)
     check_choice("method", content.get("method"), ("anchored", "paper"))
     further = ["ways"] if content["method"] == "anchored" else LAW
-    check_fields("a task", content, (*TASK, *further), ["turn"])
+    check_fields("a task", content, (*TASK, *further), ["turn", *(TIMING if further is LAW else ())])
     each_shown = _all("demonstrations", content["demonstrations"], _demonstration_from)
     shown = tuple(make_demonstration(**each) for each in each_shown)
     return _task_from(content, shown, make_task, laid_out)
@@ -215,7 +221,12 @@ def _task_from(content, shown, make_task, laid_out):
     if objects is not None:
         objects = checked_wholes("objects", objects, "N", least=-1, most=len(environment) - 1)
     notes = _all("notes", content["notes"], _note_from)
-    known = {"demonstrations": shown, "notes": notes, "partners": partners, "turn": content.get("turn", 0.0)}
+    known = {
+        "demonstrations": shown,
+        "notes": notes,
+        "partners": partners,
+        "turn": content.get("turn", 0.0),
+    }
     if content["method"] == "paper":
         law = _law_from(content)
         tied = _named("association", _association_from, content["association"], environment, anchors(law))
@@ -231,7 +242,8 @@ def _task_from(content, shown, make_task, laid_out):
 def _law_from(content):
     segments = _all("segments", content["segments"], _segment_from)
     check_positive("the number of segments", len(segments))
-    return SequencedLDS(segments, content["start"], content["speeds"])
+    timing = {name: content[name] for name in TIMING if name in content}
+    return SequencedLDS(segments, content["start"], content["speeds"], **timing)
 
 
 def _segment_from(content):
@@ -258,7 +270,7 @@ def _association_from(content, environment, places):
 
 
 def _way_from(content, count):
-    check_fields("a way", content, WAY)
+    check_fields("a way", content, WAY, ["pauses"])
     way = Way(**content)
     if len(way.home) != PLACES:
         raise ValueError(f"home must hold {PLACES} places, got {len(way.home)}")

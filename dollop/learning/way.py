@@ -21,11 +21,13 @@ from dollop.checks import (
     checked_wholes,
     put_in,
 )
+from dollop.law.pauses import Stood, in_common
+from dollop.law.timing import Stands
 from dollop.learning.frames import frames_like
 from dollop.learning.places import Places
 from dollop.learning.ways import PLACES
 from dollop.pose import rotation
-from dollop.sequenced_lds import LEAST_REACH, PERIODS, SequencedLDS, check_times
+from dollop.sequenced_lds import LEAST_REACH, LONGEST_PAUSE, PERIODS, SequencedLDS, check_times
 from dollop.trajectory import align, arc_length, check_trajectory, resample
 
 __all__ = ["Way", "curve_of", "way_of", "which_places"]
@@ -34,6 +36,8 @@ WEIGHTS, ROUNDING = (-1, 2), 1e-6
 """What a weight can be: smooth ones go a little beyond 0 and 1; and what those of a place may miss 1 by."""
 LOOSER = 4
 """Times that the tolerance of a law is doubled where objects bend its way too sharply."""
+FINE = 200
+"""Places between two stands of one pause that are tried for it: less than a centimetre apart."""
 SLOWER, FASTER = 0.2, 5.0
 """Most that a step of a walk may be shortened or stretched and still take the time that its new length takes."""
 
@@ -63,6 +67,11 @@ class Way:
         Of the walks, in s.
     tolerance : float
         Largest mean error of a segment of the law in m.
+    pauses : (P, 2) float array, optional
+        Where along the places, from 0 to L - 1, and how long in s the demonstrators stood: the walks
+        are then without it. By default it is found in the walks, and taken out of them. Who stands
+        at an end of a walk (see `dollop.law.timing.apart_within`) waits for the recording, and not
+        for the task: that is no pause of it.
 
     Raises
     ------
@@ -81,6 +90,7 @@ class Way:
     covered: tuple
     sample_period: float
     tolerance: float
+    pauses: np.ndarray | None = None
 
     def __post_init__(self):
         walks = tuple(map(check_trajectory, checked_records("walks", self.walks, object)))
@@ -114,6 +124,23 @@ class Way:
             raise ValueError("the last frame of a way must be the world, and no other")
         covered = checked_array("covered", self.covered, len(self.members), 2, least=-FARTHEST, most=FARTHEST)
         put_in(self, covered=tuple(map(tuple, covered.tolist())))
+        if self.pauses is None:
+            self._find_pauses()
+        pauses = checked_array("pauses", self.pauses, "P", 2, least=0, most=LONGEST_PAUSE)
+        if (np.diff(pauses[:, 0]) < 0).any() or pauses[:, 0].max(initial=0) > len(home) - 1:
+            raise ValueError(f"pauses must be in order, at places 0 to {len(home) - 1}, got {pauses[:, 0].tolist()}")
+        put_in(self, pauses=pauses)
+
+    def _find_pauses(self):
+        """Take what pauses the walks have out of them."""
+        stands = [Stands.of(walk, self.sample_period, "inner") for walk in self.walks]
+        shares = [each.of_walk(share) for each, share in zip(stands, self.shares, strict=True)]
+        found = []
+        for k, (each, share) in enumerate(zip(stands, shares, strict=True)):
+            found += map(Stood, share[each.rows].tolist(), each.seconds.tolist(), [k] * len(each.rows))
+        pauses = in_common(found, lambda at: len(stands), arc_length(self.home)[-1], len(self.home) - 1)
+        pauses = np.array([pause[:2] for pause in pauses]).reshape(-1, 2)
+        put_in(self, walks=tuple(each.walk for each in stands), shares=tuple(shares), pauses=pauses)
 
     def __repr__(self):
         return f"Way of {len(self.home)} places, shown {len(self.members)} x"
@@ -169,14 +196,17 @@ class Way:
 
         Returns
         -------
-        list of (N_k, 2) float arrays
-            In m.
+        list of Stands
+            In m; the pauses are as long as they were shown, where their places are now.
         """
-        if np.allclose(now, self.home, rtol=0, atol=1e-9):
-            return list(self.walks)
-        displaced = scipy.interpolate.CubicSpline(np.arange(len(now)), now - self.home)
-        pairs = zip(self.walks, self.shares, strict=True)
-        return [_at_shown_speed(walk, walk + displaced(share)) for walk, share in pairs]
+        places, seconds = self.pauses.T
+        rows = [np.abs(share - places[:, None]).argmin(axis=1) for share in self.shares]
+        walks = list(self.walks)
+        if not np.allclose(now, self.home, rtol=0, atol=1e-9):
+            displaced = scipy.interpolate.CubicSpline(np.arange(len(now)), now - self.home)
+            moved = [walk + displaced(share) for walk, share in zip(walks, self.shares, strict=True)]
+            walks, rows = zip(*map(_at_shown_speed, walks, moved, rows), strict=True)
+        return [Stands.known(walk, self.sample_period, row, seconds) for walk, row in zip(walks, rows, strict=True)]
 
     def law(self, now):
         """The control law along the places as they are now (Sec. III).
@@ -189,6 +219,7 @@ class Way:
         Returns
         -------
         law : SequencedLDS
+            It waits where the demonstrators did, and neither at its start nor at its end.
         tolerance : float
             That it keeps, in m: larger than the way's where it bends too sharply for that, as the
             walks that were shown do not.
@@ -198,25 +229,41 @@ class Way:
         ValueError
             Where the walks that were shown cannot be segmented at their tolerance.
         """
-        walks, tolerance = self.walked(now), self.tolerance
+        stands, tolerance = self.walked(now), self.tolerance
+        at_home = np.allclose(now, self.home, rtol=0, atol=1e-9)
         for _ in range(LOOSER):
             try:
-                return SequencedLDS.fit(walks, tolerance, sample_period=self.sample_period), tolerance
+                return self._fitted(stands, tolerance), tolerance
             except ValueError:
-                if walks[0] is self.walks[0] and len(self.members) == 1:
+                if at_home and len(self.members) == 1:
                     raise
                 tolerance *= 2
-        return SequencedLDS.fit(walks, tolerance, sample_period=self.sample_period), tolerance
+        return self._fitted(stands, tolerance), tolerance
+
+    def _fitted(self, stands, tolerance):
+        law = SequencedLDS.fit_stands(stands, tolerance, sample_period=self.sample_period)
+        return law.without_waits_at_ends()
 
 
-def _at_shown_speed(before, after):
-    """A walk (N, 2) moved from `before`, sampled anew so that each step keeps its speed."""
+def _at_shown_speed(before, after, stops=()):
+    """A walk (N, 2) moved from `before`, sampled anew so that each step keeps its speed.
+
+    And at which samples it then stops that stopped at samples `stops` (P,).
+    """
     was, now = (np.linalg.norm(np.diff(walk, axis=0), axis=1) for walk in (before, after))
     stretched = np.clip(now / np.maximum(was, 1e-9), SLOWER, FASTER)
     time = np.concatenate([[0.0], np.where(was > 1e-9, stretched, 1.0).cumsum()])
-    count = max(3, round(time[-1]) + 1)
-    at = np.linspace(0, time[-1], count)
-    return np.stack([np.interp(at, time, column) for column in after.T], axis=1)
+    at, stops = _ticks(time[-1], time[np.asarray(stops, int)])
+    return np.stack([np.interp(at, time, column) for column in after.T], axis=1), stops
+
+
+def _ticks(lasting, stops):
+    """Times from 0 to `lasting`, about 1 apart, and which of them are those of the stops (P,)."""
+    ends = np.concatenate([[0.0], stops, [lasting]])
+    counts = np.maximum(np.rint(np.diff(ends)).astype(int), np.diff(ends) > 0)
+    counts[-1] = max(counts[-1], 2 - counts[:-1].sum())
+    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
+    return np.append(np.concatenate(parts), lasting), counts[:-1].cumsum()
 
 
 def curve_of(walks):
@@ -265,9 +312,9 @@ def way_of(members, laid, frames, home, shown, curves):
     home : Frames
         Of the environment to learn in.
     shown : sequence of K demonstrations
-        With `walks`, `sample_period` and `tolerance`.
+        With `stands`, `sample_period` and `tolerance`.
     curves : sequence of K (curve, moments)
-        From `curve_of`.
+        From `curve_of`, of their walks without the pauses.
 
     Returns
     -------
@@ -278,16 +325,62 @@ def way_of(members, laid, frames, home, shown, curves):
     covered = tuple(_range_of(row) for row in laid.covered)
     tolerance = min(each.tolerance for each in shown)
     period = float(np.median([each.sample_period for each in shown]))
-    if len(members) == 1:
-        walks = tuple(shown[0].walks)
+    alone = len(members) == 1
+    at_home = laid.points[0] if alone else places.among(home)[0]
+    pauses = _pauses(laid, shown, curves, at_home, None if alone else places.among(frames))
+    if alone:
+        walks = tuple(each.walk for each in shown[0].stands)
         shares = tuple(_share_of(walk, at) for walk, at in zip(walks, curves[0][1], strict=True))
-        at_home = laid.points[0]
     else:
-        at_home = places.among(home)[0]
-        pace = _pace(laid, shown, curves)
-        walk, share = _timed(at_home, pace, period)
+        walk, share = _timed(at_home, _pace(laid, shown, curves), period, pauses[:, 0])
         walks, shares = (walk,), (share,)
-    return Way(walks, shares, at_home, *known, covered, period, tolerance)
+    return Way(walks, shares, at_home, *known, covered, period, tolerance, pauses)
+
+
+def _pauses(laid, shown, curves, places, predicted=None):
+    """Where along the places (L, 2), and how long in s, the demonstrators stood: (P, 2).
+
+    Of several demonstrations it is the place from which all stands are seen best, given where the
+    way has its places in each of them, `predicted` (K, L, 2).
+    """
+    found, walks = [], np.zeros(len(places))
+    for k, (at, covered, each, (_, moments)) in enumerate(zip(laid.at, laid.covered, shown, curves, strict=True)):
+        walks += len(moments) * covered
+        inside = np.flatnonzero(covered)
+        for j, (stands, moment) in enumerate(zip(each.stands, moments, strict=True)):
+            sample = _share_of(stands.walk, moment)[stands.rows]
+            seen = (sample >= at[inside[0]]) & (sample <= at[inside[-1]])
+            where = np.interp(sample[seen], *_rising(at[inside], inside)).tolist()
+            stood = stands.walk[stands.rows[seen]].tolist()
+            found += map(
+                Stood,
+                where,
+                stands.seconds[seen].tolist(),
+                [(k, j)] * len(where),
+                map(tuple, stood),
+            )
+    pauses = in_common(found, lambda at: walks[round(at)], arc_length(places)[-1], len(places) - 1)
+    if predicted is not None:
+        pauses = sorted((_best_seen(each.stood, predicted), each.seconds) for each in pauses)
+    return np.array([each[:2] for each in pauses]).reshape(-1, 2)
+
+
+def _best_seen(stood, predicted):
+    """Which place, between those of some stands, is the least squared distance from all of them."""
+    at = [each.at for each in stood]
+    tried = np.linspace(min(at), max(at), FINE)
+    missed = np.zeros(FINE)
+    for each in stood:
+        way = predicted[each.walk[0]]
+        x, y = (np.interp(tried, np.arange(len(way)), column) for column in way.T)
+        missed += (x - each.place[0]) ** 2 + (y - each.place[1]) ** 2
+    return float(tried[np.argmin(np.nan_to_num(missed, nan=np.inf))])
+
+
+def _rising(values, numbers):
+    """Values that never fall, without those that stay, and their numbers: the middle of those."""
+    values, which = np.unique(values, return_inverse=True)
+    return values, np.bincount(which, numbers) / np.bincount(which)
 
 
 def _range_of(covered):
@@ -317,13 +410,17 @@ def _pace(laid, shown, curves):
     return np.where(weight > 0, taken / np.maximum(weight, 1), typical)
 
 
-def _timed(places, pace, period):
-    """A walk along places (L, 2) that takes `pace` (L - 1,) in s between them, and its share along them."""
+def _timed(places, pace, period, stops=()):
+    """A walk along places (L, 2) that takes `pace` (L - 1,) in s between them, and its share along them.
+
+    Some samples are at `stops` (P,), shares along the places.
+    """
     pace = np.maximum(pace, 1e-3 * period)
     time = np.concatenate([[0.0], pace.cumsum()])
     check_times(time[-1], period)
-    count = max(3, round(time[-1] / period) + 1)
-    share = np.interp(np.linspace(0, time[-1], count), time, np.arange(len(places)))
+    at, rows = _ticks(time[-1] / period, np.interp(stops, np.arange(len(places)), time) / period)
+    share = np.interp(at * period, time, np.arange(len(places)))
+    share[rows] = stops
     return scipy.interpolate.CubicSpline(np.arange(len(places)), places)(share), share
 
 

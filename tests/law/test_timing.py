@@ -42,6 +42,59 @@ def test_a_pause_is_found_where_it_was(pause, noise):
     assert len(stands.walk) + np.sum(stands.seconds) / PERIOD == pytest.approx(len(walk))
 
 
+@pytest.mark.parametrize("noise", [0.02, 0.03])
+@pytest.mark.parametrize("pause", [1.5, 5.0, 20.0])
+def test_swaying_hides_no_pause(pause, noise):
+    """Samples that scatter by 2 or 3 cm along each axis: one stand, to 0.5 s, within 5 cm of its place."""
+    for seed in range(5):
+        stands = Stands.of(walk_with_pause(pause=pause, noise=noise, seed=seed), PERIOD)
+        assert stands.seconds == pytest.approx([pause], abs=0.5)
+        assert np.linalg.norm(stands.walk[stands.rows[0]] - [1.5, 0.45]) < 0.05
+
+
+def test_noise_makes_no_pause_of_a_slow_walk():
+    """At 0.3 m/s, with samples that scatter by 3 cm, nobody stands."""
+    for seed in range(5):
+        walk = walk_with_pause(pause=0.0, speed=0.3, noise=0.03, seed=seed)
+        assert not len(Stands.of(walk, PERIOD).rows)
+
+
+def test_who_brakes_stands_from_when_they_stand():
+    """Half a metre of braking and of speeding up at 0.7 m/s^2, and 4 s between: 4 s, to a third of a second."""
+    t = np.arange(0, 14, PERIOD)
+    braking = 0.8 / 0.7
+    begin, end = 4.0, 8.0
+    left = np.clip(begin - t, 0, None)
+    gone = np.clip(t - end, 0, None)
+    way = [0.35 * np.minimum(each, braking) ** 2 + 0.8 * np.maximum(each - braking, 0) for each in (left, gone)]
+    walk = np.column_stack([way[1] - way[0], 0 * t]) + np.random.default_rng(0).normal(0, 0.004, (len(t), 2))
+    assert Stands.of(walk, PERIOD).seconds == pytest.approx([4.0], abs=0.35)
+
+
+def test_ends_are_told_from_the_way():
+    """2 s before the first step, 3 s on the way, 4 s after the last: the way has one stand, its ends two."""
+    walk = walk_with_pause()
+    walk = np.vstack([[walk[0]] * 20, walk, [walk[-1]] * 40])
+    whole, inner, ends = (Stands.of(walk, PERIOD, which) for which in ("all", "inner", "ends"))
+    assert whole.inner.tolist() == [False, True, False]
+    assert inner.seconds == pytest.approx([3.0], abs=0.3) and inner.inner.all()
+    assert ends.seconds == pytest.approx([2.0, 4.0], abs=0.3) and not ends.inner.any()
+    assert np.array_equal(
+        inner.of_walk(walk)[~np.isin(np.arange(len(inner.walk)), inner.rows)], np.delete(inner.walk, inner.rows, axis=0)
+    )
+
+
+@pytest.mark.parametrize("length", [4.0, 20.0, 60.0])
+def test_the_subgoal_of_a_pause_is_where_it_was(length):
+    """However long the walk is, and far apart its candidate cuts are: to 1 cm."""
+    for at in (0.31 * length, 0.5 * length, 0.77 * length):
+        s = np.concatenate([np.arange(0, at, 0.08), np.full(40, at), np.arange(at, length, 0.08)])
+        walk = np.column_stack([s, np.sin(s)])
+        law = SequencedLDS.fit(walk)
+        subgoal = law.subgoals[np.argmax(law.pauses[1:])]
+        assert np.hypot(*(subgoal - [at, np.sin(at)])) < 0.01
+
+
 @pytest.mark.parametrize("period", [0.02, 0.1, 0.25, 0.3])
 def test_the_rule_is_one_of_seconds(period):
     """However often it is sampled, standing for 2 s is a pause and standing for half a second none."""
