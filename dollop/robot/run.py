@@ -71,7 +71,7 @@ class Run:
         segment handed over. NaN if nobody tells.
     reached : (K,) bool array
         Which subgoals of the way in force at the end the robot came to: within the distance at
-        which a segment hands over, or its radius where that is more; 0.15 m more is left to a
+        which a segment hands over, or as near as there is room; 0.15 m more is left to a
         localisation. Empty if nobody tells.
     farthest : float
         Largest distance in m of the robot from the way in force, once it has come to it within that

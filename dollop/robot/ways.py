@@ -326,11 +326,6 @@ class WayKeeper:
             return f"way {way} is closed"
         return "way {} was left at ({:.2f}, {:.2f})".format(way, *self.left[way])
 
-    @property
-    def enough(self):
-        """Float: the distance in m within which a robot must have room near a subgoal."""
-        return max(self.rules.reach, self.known.radius)
-
     def needs(self):
         """How near the robot must come to each subgoal of the way in force.
 
@@ -404,7 +399,7 @@ class WayKeeper:
         if self.obstacles is None:
             return ""
         for k, goal in enumerate(way.law.subgoals.tolist()[segment:], segment):
-            told = self.obstacles.no_way((x, y), goal, self.enough)
+            told = self.obstacles.no_way((x, y), goal, self.rules.reach)
             if told:
                 return told.format(f"subgoal {k}")
         return ""
