@@ -37,6 +37,7 @@ import pandas as pd
 import dollop
 from benchmarks.furnished import drawn
 
+RADII = 0.18, 0.25, 0.40
 MARGINS = 0.0, 0.02, 0.05, 0.067
 """m."""
 REACH, SLACK = 0.25, 0.05
@@ -351,7 +352,7 @@ def write_failures(table, folder):
 def parsed(arguments=None):
     """What the command line asks for."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.driving", description=__doc__.split("\n")[0])
-    parser.add_argument("--radius", type=float, nargs="+", default=[0.18, 0.25, 0.40], help="in m")
+    parser.add_argument("--radius", type=float, nargs="+", help="in m, default: 0.18 0.25 0.4; the Pioneer's own")
     parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--count", type=int, help="of seeds, default: 100, and 30 with --pybullet")
     parser.add_argument("--control", default="pursuit", choices=["pursuit", "plain"])
@@ -369,12 +370,14 @@ def main(arguments=None):
     if options.pybullet:
         from benchmarks import driving_lab as course
 
-        jobs = [joblib.delayed(course.rows_of)(seed) for seed in seeds_of(options, 30)]
+        radii = options.radius or [course.Pioneer.radius]
+        jobs = [joblib.delayed(course.rows_of)(seed, radii) for seed in seeds_of(options, 30)]
     else:
         from benchmarks import driving as course
 
         how = {name: getattr(options, name) for name in ("control", "kidnappings", "steps", "pictures")}
-        jobs = [joblib.delayed(course.rows_of)(seed, options.radius, **how) for seed in seeds_of(options, 100)]
+        radii = options.radius or RADII
+        jobs = [joblib.delayed(course.rows_of)(seed, radii, **how) for seed in seeds_of(options, 100)]
     if options.pictures:
         Path(options.pictures).mkdir(parents=True, exist_ok=True)
     parts = joblib.Parallel(options.workers)(jobs)
