@@ -462,7 +462,7 @@ def ways_of(task, only=False):
 
 def named_subgoals(law):
     """The subgoals of a law, each with its name."""
-    return [(f"subgoal {k}", place) for k, place in enumerate(law.subgoals)]
+    return [(f"subgoal {k}", place) for k, place in enumerate(law.subgoals, 1)]
 
 
 def check_some_way(ways, obstacles, enough):

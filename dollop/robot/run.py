@@ -253,7 +253,7 @@ def _cut_short(waits, period):
     """Why the waits (W, 3) were not those that were shown; empty if they were."""
     for place, shown, stood in waits:
         if stood < shown - period:
-            where = f"subgoal {place - 1:.0f}" if place else "the start"
+            where = f"subgoal {place:.0f}" if place else "the start"
             return f"it stood {stood:.1f} s at {where} where {shown:.1f} s were shown"
     return ""
 
@@ -345,7 +345,7 @@ class Driven:
         first = self.active[since[-1] + 1] if len(since) else 0
         for k in range(first, len(reached)):
             if not reached[k]:
-                return f"subgoal {k} was not reached: {least[k]:.2f} m at the nearest"
+                return f"subgoal {k + 1} was not reached: {least[k]:.2f} m at the nearest"
         return ""
 
     def notes(self, t):

@@ -314,7 +314,7 @@ class WayKeeper:
         str
         """
         closed = self.closed(self.ways[self.way], self.active, x, y)
-        told = closed or f"no progress towards subgoal {self.active}"
+        told = closed or f"no progress towards subgoal {self.active + 1}"
         if len(self.ways) == 1:
             return told
         others = (self._tell(way.index) for way in self.ways if way.index != self.way)
@@ -401,7 +401,7 @@ class WayKeeper:
         for k, goal in enumerate(way.law.subgoals.tolist()[segment:], segment):
             told = self.obstacles.no_way((x, y), goal, self.rules.reach)
             if told:
-                return told.format(f"subgoal {k}")
+                return told.format(f"subgoal {k + 1}")
         return ""
 
     def look_closer(self):
