@@ -166,7 +166,7 @@ def judged(room, task, radius, control="pursuit", kidnappings=USUAL, steps=False
     row = {"seed": room.seed, "radius": radius, "kind": room.kind, "made": ", ".join(room.made)}
     ready = robot_in(room, task, radius, kidnappings)
     if ready is None:
-        return row | {"outcome": "no place to stand"}, None
+        return row | {"outcome": "no way from the start" if kidnappings > USUAL else "no place to stand"}, None
     robot, kidnap = ready
     poses = [robot.pose, *(pose for _, pose in kidnap)]
     row |= {"margin": margin_of(room, task, radius, poses), "subgoals": len(task.law.subgoals), "period": robot.period}
