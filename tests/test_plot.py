@@ -233,7 +233,7 @@ def test_waits_are_told_in_seconds(ax):
 
 
 def test_a_run_shows_what_it_reached_and_where_it_was_carried(ax):
-    """Subgoals have numbers, grey where they were not reached; kidnappings are lettered leaps; the robot has its size."""
+    """Subgoals have numbers, and are grey if not reached; kidnappings are lettered leaps; the robot has its size."""
     task = learned([0.0, 2.0, 0.0, 0.0])
     background = room_map()
     robot = Unicycle((*task.law.start, 0.0), radius=0.3)
