@@ -17,7 +17,7 @@ along than the robot has come.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, cos, hypot, inf, isfinite, sin
+from math import ceil, cos, inf, isfinite, sin
 
 import numpy as np
 
@@ -338,20 +338,6 @@ class WayKeeper:
         if self.obstacles is None:
             return np.full(len(goals), self.rules.reach)
         return np.array([max(self.rules.reach, self.obstacles.nearest_room(*goal) + AT_END) for goal in goals])
-
-    def leapt(self, x, y, now_x, now_y):
-        """Whether no robot drives from one place to another in one period.
-
-        Parameters
-        ----------
-        x, y, now_x, now_y : float
-            Both places in m.
-
-        Returns
-        -------
-        bool
-        """
-        return hypot(now_x - x, now_y - y) > self.supervisor.jump
 
     def waits(self):
         """How the robot has waited.
