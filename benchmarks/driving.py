@@ -1,21 +1,26 @@
 """How robots of any size perform tasks in rooms drawn at random: python -m benchmarks.driving
 
     python -m benchmarks.driving [--radius 0.18 0.25 0.40] [--first 0] [--count 100] [--control pursuit|plain]
-        [--workers 2] [--out TABLE.csv] [--pictures FOLDER]
+        [--workers 2] [--out TABLE.csv] [--pictures FOLDER] [--kidnappings 2] [--steps] [--pybullet]
 
 A room, a walk of a person through it, the task that `dollop.learn` makes of it, at times adapted to moved objects, and
 a robot of each radius with limits and a control period of its own that begins near the start at any heading, and is
 kidnapped twice to places that are free for it (`benchmarks.furnished`). `dollop.perform` drives it.
 
 What came of it is judged by an oracle that knows nothing of how Dollop measures: exact distances to boxes and to
-occupied cells as squares, and a flood fill on a grid of 1.7 cm. A *way of that width exists* where the start, both
-kidnapping poses and a place within 0.25 m of each subgoal of one of the task's ways lie in one part of the floor that
-is nowhere nearer to anything than radius + margin; for the margins 0, 2, 5 and 6.7 cm.
+occupied cells as squares, and a flood fill on a grid of 1.7 cm. A robot is *at* a subgoal where its disc covers it, or
+within 0.25 m. A *way of that width exists* where the start, all kidnapping poses and a place at each subgoal of one of
+the task's ways lie in one part of the floor that is nowhere nearer to anything than radius + margin; for the margins 0,
+2, 5 and 6.7 cm.
 
 touched      the exact clearance was below zero somewhere
 told_error   the largest difference in m between the clearance told and the exact one, where one of both is below 0.5 m
-wrong        finished, but ended more than 0.3 m from the last subgoal, or not within 0.3 m of each of the last way's
-             subgoals one after the other (or, where it cannot come so near, 0.1 m more than it can)
+wrong        finished, but was not at each of the last way's subgoals, to 5 cm, one after the other, nor ended there
+no_way       what came of the runs where no way of the robot's own width exists
+
+With more `--kidnappings` than two they come every four seconds on average, to places from which there is a way that is
+6.7 cm wider than the robot: none of these runs may touch anything, or end unfinished. With `--steps` each run is driven
+once more, by `dollop.Controller` in a loop of its own, and the commands are compared to the last digit.
 """
 
 import argparse
@@ -33,8 +38,16 @@ from benchmarks.furnished import drawn
 
 MARGINS = 0.0, 0.02, 0.05, 0.067
 """m."""
-REACH, NEAR = 0.25, 0.3
-"""m: within which a segment hands over, and within which a robot was at a subgoal."""
+REACH, SLACK = 0.25, 0.05
+"""m: within which a robot is at a subgoal, however small it is, and how much farther off between two periods."""
+USUAL, PAUSE = 2, 4.0
+"""Kidnappings in a run; and, where there are more, s between two of them on average."""
+SLOW = 20.0
+"""ms: a step that takes longer is slow."""
+GROUPS = ("radius",)
+"""Columns by which runs are told apart."""
+NO_WAY = "no way|no room|must be free|must lie"
+"""What reasons say that a robot of this size cannot do the task here."""
 FAR = 0.5
 """m: beyond it a clearance tells nothing."""
 
@@ -48,21 +61,55 @@ def task_of(room):
     return task
 
 
-def robot_in(room, task, radius):
-    """A robot near the start of the task, and two kidnappings (time, pose); None where it has no place to stand."""
+def robot_in(room, task, radius, kidnappings=USUAL):
+    """A robot near the start of the task, and kidnappings (time, pose); None where it has no place to stand."""
     rng = np.random.default_rng([room.seed, round(1000 * radius), 15])
     limits = rng.uniform(0.2, 1.0), rng.uniform(0.5, 2.0), rng.uniform(0.2, 2.0), rng.uniform(0.5, 4.0)
     period = float(rng.choice([0.02, 0.05, 0.1, 0.2]))
     start = place_near(rng, room.now, task.law.start, radius)
-    places = room.now.random_places(rng, 2, radius + 0.005)
-    if start is None or len(places) < 2:
+    if start is None:
         return None
     length = np.hypot(*np.diff(task.law.response(), axis=0).T).sum()
     lasting = 3.0 + length / min(limits[0], 0.8)
-    times = np.sort(rng.uniform(0.0, lasting, 2)).tolist()
-    headings = rng.uniform(-np.pi, np.pi, 3)
-    kidnap = [(t, (*place.tolist(), h)) for t, place, h in zip(times, places, headings[1:], strict=True)]
-    return dollop.Unicycle((*start.tolist(), headings[0]), limits, period, radius=radius), kidnap
+    if kidnappings <= USUAL:
+        places = room.now.random_places(rng, kidnappings, radius + 0.005)
+        times = np.sort(rng.uniform(0.0, lasting, kidnappings))
+    else:
+        places = places_with_a_way(rng, room.now, task, start, radius, kidnappings)
+        times = np.cumsum(rng.exponential(PAUSE, kidnappings))
+    if len(places) < kidnappings:
+        return None
+    headings = rng.uniform(-np.pi, np.pi, 1 + kidnappings).tolist()
+    poses = [(*place, heading) for place, heading in zip(places.tolist(), headings[1:], strict=True)]
+    robot = Recorded((*start.tolist(), headings[0]), limits, period, radius=radius)
+    return robot, list(zip(times.tolist(), poses, strict=True))
+
+
+class Recorded(dollop.Unicycle):
+    """A Unicycle that remembers what it was asked for."""
+
+    def place(self, pose):
+        """Put the robot somewhere."""
+        super().place(pose)
+        self.commands = getattr(self, "commands", [])
+
+    def drive(self, speed, turn):
+        """Drive for one period."""
+        self.commands.append((speed, turn))
+        super().drive(speed, turn)
+
+
+def places_with_a_way(rng, truth, task, start, radius, count):
+    """Places (count, 2) in m with a way that is wider than the robot; none where there is none from its start."""
+    parts = truth.parts(radius + MARGINS[-1])
+    there = truth.part_at(parts, start, REACH)
+    reach = max(REACH, radius)
+    good = [k for k in there if any(connected(truth, parts, {k}, way.subgoals, reach) for way in task.ways)]
+    rows, columns = np.nonzero(np.isin(parts, good))
+    if not good:
+        return np.empty((0, 2))
+    chosen = rng.integers(len(rows), size=count)
+    return np.column_stack([truth.points[0][columns[chosen]], truth.points[1][rows[chosen]]])
 
 
 def place_near(rng, truth, place, radius):
@@ -84,51 +131,37 @@ def margin_of(room, task, radius, poses):
     for margin in MARGINS:
         parts = room.now.parts(radius + margin)
         common = set.intersection(*(room.now.part_at(parts, pose[:2]) for pose in poses))
-        if not any(connected(room.now, parts, common, way.subgoals) for way in task.ways):
+        if not any(connected(room.now, parts, common, way.subgoals, max(REACH, radius)) for way in task.ways):
             break
         held = margin
     return held
 
 
-def connected(truth, parts, common, subgoals):
-    """Whether one of some parts of the floor comes within reach of each subgoal (K, 2)."""
+def connected(truth, parts, common, subgoals, reach):
+    """Whether one of some parts of the floor comes so near in m to each subgoal (K, 2)."""
     for subgoal in subgoals:
-        common = common & truth.part_at(parts, subgoal, REACH)
+        common = common & truth.part_at(parts, subgoal, reach)
     return bool(common)
 
 
-def nearest_standing(truth, subgoal, radius):
-    """Distance in m from a subgoal to the nearest place where the robot touches nothing, of those within 2 m."""
-    x, y = truth.points
-    columns, rows = (np.flatnonzero(np.abs(each - at) < 2) for each, at in zip((x, y), subgoal, strict=True))
-    free = truth.clear[np.ix_(rows, columns)] >= radius
-    away = np.hypot(x[columns] - subgoal[0], y[rows, None] - subgoal[1])
-    return away[free].min(initial=2.0)
-
-
-def missed(room, run, task, radius):
-    """Why a run that says it finished did not, or nothing."""
-    way = int(run.way[-1])
-    subgoals, places = task.ways[way].subgoals, run.true_poses[:, :2]
-    if len(subgoals) > 1 and (run.way != way).any():  # what it had done on another way counts as done here
-        first = np.flatnonzero(run.way != way)[-1] + 1
-        skipped, places = int(run.active[first]), places[first:]
-    else:
-        skipped = 0
-    now = 0
-    for k in range(skipped, len(subgoals)):
+def missed(run, task, radius):
+    """Why a run that says it finished did not, or nothing; what it had done on another way counts as done."""
+    way, within = int(run.way[-1]), max(REACH, radius) + SLACK
+    subgoals, first, now = task.ways[way].subgoals, int(np.append(np.flatnonzero(run.way != way), -1).max()) + 1, 0
+    places = run.true_poses[first:, :2]
+    for k in range(int(run.active[first]) if first else 0, len(subgoals)):
         away = np.hypot(*(places[now:] - subgoals[k]).T)
-        within = max(NEAR, 0.1 + nearest_standing(room.now, subgoals[k], radius))
         if not (away <= within).any():
             return f"subgoal {k} missed by {away.min():.2f} m"
         now += int(np.argmax(away <= within))
-    return ""
+    end = np.hypot(*(places[-1] - subgoals[-1]))
+    return "" if end <= within else f"ended {end:.2f} m from the last subgoal"
 
 
-def judged(room, task, radius, control):
+def judged(room, task, radius, control="pursuit", kidnappings=USUAL, steps=False):
     """One row of the table, and the run; the run is None where there is none."""
     row = {"seed": room.seed, "radius": radius, "kind": room.kind, "made": ", ".join(room.made)}
-    ready = robot_in(room, task, radius)
+    ready = robot_in(room, task, radius, kidnappings)
     if ready is None:
         return row | {"outcome": "no place to stand"}, None
     robot, kidnap = ready
@@ -140,8 +173,34 @@ def judged(room, task, radius, control):
     except Exception as error:
         outcome = "refused" if isinstance(error, ValueError) else "crashed"
         return row | {"outcome": outcome, "reason": f"{type(error).__name__}: {error}"}, None
-    took = time.perf_counter() - began
-    return row | measures(room, task, radius, run) | {"step_ms": 1e3 * took / len(run.t)}, run
+    row |= {"step_ms": 1e3 * (time.perf_counter() - began) / len(run.t)} | measures(room, task, radius, run)
+    if steps:
+        again, _ = robot_in(room, task, radius, kidnappings)
+        row |= stepped(task, again, control, room.background, kidnap, robot.commands)
+    return row, run
+
+
+def stepped(task, robot, control, background, kidnap, commands):
+    """The same run by `Controller.step` in a loop of its own: whether it asks for the same, how long steps take."""
+    places, kidnap, took = [pose for _, pose in kidnap], list(kidnap), []
+    controller = dollop.Controller(task, robot, control, background=background, places=[robot.pose, *places])
+    while not controller.over:
+        if kidnap and len(took) * robot.period > kidnap[0][0] - robot.period / 2:
+            robot.place(kidnap.pop(0)[1])
+        began = time.perf_counter()
+        command = controller.step(robot.pose)
+        took.append(1e3 * (time.perf_counter() - began))
+        robot.drive(*command)
+    if controller.reason:
+        robot.drive(0.0, 0.0)
+    speed, turn = np.abs(np.array(robot.commands).reshape(-1, 2)).max(axis=0)
+    return {
+        "same": robot.commands == commands,
+        "within_limits": bool(speed <= robot.limits.speed and turn <= robot.limits.turn),
+        "median_step_ms": float(np.median(took)),
+        "slow_steps": float(np.mean(np.array(took) > SLOW)),
+        "slowest_step_ms": max(took),
+    }
 
 
 def measures(room, task, radius, run):
@@ -149,7 +208,7 @@ def measures(room, task, radius, run):
     exact = room.now.distance(run.true_poses) - radius
     near = (exact < FAR) | (run.clearance < FAR)
     away = np.abs(run.clearance - exact)[near]
-    wrong = missed(room, run, task, radius) if run.finished else ""
+    wrong = missed(run, task, radius) if run.finished else ""
     found = {
         "outcome": "wrong" if wrong else "finished" if run.finished else "not finished",
         "reason": wrong or run.reason,
@@ -171,7 +230,7 @@ def measures(room, task, radius, run):
 # ---- rows, tables, pictures
 
 
-def rows_of(seed, radii, control="pursuit", pictures=None):
+def rows_of(seed, radii, pictures=None, **how):
     """The rows of a seed, one for each radius."""
     room = drawn(seed)
     try:
@@ -181,7 +240,7 @@ def rows_of(seed, radii, control="pursuit", pictures=None):
         return [{"seed": seed, "radius": radius} | told for radius in radii]
     rows = []
     for radius in radii:
-        row, run = judged(room, task, radius, control)
+        row, run = judged(room, task, radius, **how)
         rows.append(row)
         if pictures and is_failure(row):
             picture(room, task, row, run, radius, Path(pictures) / f"{seed}_{radius:g}.png")
@@ -191,6 +250,7 @@ def rows_of(seed, radii, control="pursuit", pictures=None):
 def is_failure(row):
     """Whether a row is no success: wrong, touched, crashed, or given up or refused where a way exists."""
     gave_up = row["outcome"] in ("not finished", "refused") and row["margin"] >= 0
+    gave_up |= row.get("same") is False
     return gave_up or row["outcome"] in ("wrong", "crashed", "not learned") or row.get("touched") is True
 
 
@@ -208,18 +268,24 @@ def of_radius(radius, part):
         line[f"way_{100 * margin:g}cm"] = f"{(some.outcome == 'finished').sum()}/{len(some)}"
     none = part[part.margin < 0]
     line["no_way"] = ", ".join(f"{n} {name}" for name, n in none.outcome.value_counts().items())
+    unfinished = none[none.outcome != "finished"]
+    line["said_so"] = f"{unfinished.reason.fillna('').str.contains(NO_WAY).sum()}/{len(unfinished)}"
     line |= {"touched": int(ran.touched.sum()), "told_touched": int((ran.collisions > 0).sum())}
     line |= {"wrong": int((part.outcome == "wrong").sum()), "crashed": int((part.outcome == "crashed").sum())}
     line |= {"told_error": ran.told_error.max(), "step_ms": ran.step_ms.median(), "step_ms_max": ran.step_ms.max()}
-    return line | {"periods": int(ran.periods.sum())}
+    line |= {"kidnappings": int(ran.kidnapped.sum()), "periods": int(ran.periods.sum())}
+    if "same" in ran:
+        line |= {"same": f"{(ran.same == True).sum()}/{len(ran)}", "beyond": int((ran.within_limits == False).sum())}  # noqa: E712
+        line |= {"median_step_ms": ran.median_step_ms.median(), "slowest_step_ms": ran.slowest_step_ms.max()}
+    return line
 
 
-def reasons(table):
-    """How often each reason was given, by radius and whether a way exists."""
+def reasons(table, groups=GROUPS):
+    """How often each reason was given, by some columns and whether a way exists."""
     told = table[table.outcome != "finished"].copy()
     told["reason"] = told.reason.fillna("").str.replace(r"-?\d+(\.\d+)?", "#", regex=True)
     told["way"] = told.margin >= 0
-    return told.groupby(["radius", "way", "outcome", "reason"]).size()
+    return told.groupby([*groups, "way", "outcome", "reason"]).size()
 
 
 def picture(room, task, row, run, radius, path):
@@ -273,28 +339,43 @@ def parsed(arguments=None):
     parser = argparse.ArgumentParser(prog="python -m benchmarks.driving", description=__doc__.split("\n")[0])
     parser.add_argument("--radius", type=float, nargs="+", default=[0.18, 0.25, 0.40], help="in m")
     parser.add_argument("--first", type=int, default=0, help="seed")
-    parser.add_argument("--count", type=int, default=100, help="of seeds")
+    parser.add_argument("--count", type=int, help="of seeds, default: 100, and 30 with --pybullet")
     parser.add_argument("--control", default="pursuit", choices=["pursuit", "plain"])
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", help="table as CSV")
     parser.add_argument("--pictures", help="folder for pictures of the failures")
+    parser.add_argument("--kidnappings", type=int, default=USUAL, help="in each run")
+    parser.add_argument("--steps", action="store_true", help="once more by Controller.step, and compare")
+    parser.add_argument("--pybullet", action="store_true", help="the Pioneer, see benchmarks.driving_lab; 30 rooms")
     return parser.parse_args(arguments)
 
 
 def main(arguments=None):
     options = parsed(arguments)
+    if options.pybullet:
+        from benchmarks import driving_lab as course
+
+        jobs = [joblib.delayed(course.rows_of)(seed) for seed in seeds_of(options, 30)]
+    else:
+        from benchmarks import driving as course
+
+        how = {name: getattr(options, name) for name in ("control", "kidnappings", "steps", "pictures")}
+        jobs = [joblib.delayed(course.rows_of)(seed, options.radius, **how) for seed in seeds_of(options, 100)]
     if options.pictures:
         Path(options.pictures).mkdir(parents=True, exist_ok=True)
-    seeds = range(options.first, options.first + options.count)
-    asked = (joblib.delayed(rows_of)(seed, options.radius, options.control, options.pictures) for seed in seeds)
-    rows = joblib.Parallel(options.workers)(asked)
-    table = pd.DataFrame([row for part in rows for row in part])
+    parts = joblib.Parallel(options.workers)(jobs)
+    table = pd.DataFrame([row for part in parts for row in part])
     if options.out:
         table.to_csv(options.out, index=False)
-    if options.pictures:
+    if options.pictures and not options.pybullet:
         write_failures(table, options.pictures)
-    print(summary(table).to_string(index=False))
-    print(reasons(table).to_string())
+    print(course.summary(table).to_string(index=False))
+    print(reasons(table, course.GROUPS).to_string())
+
+
+def seeds_of(options, count):
+    """The seeds that are asked for."""
+    return range(options.first, options.first + (options.count or count))
 
 
 if __name__ == "__main__":

@@ -810,7 +810,7 @@ def smooth_in_sight(t, measurements, motion, sd):
 
     ends = []
     for k, part in enumerate(parts):
-        sure = surely(part, t, sd, k > 0, k + 1 < len(parts))
+        sure = surely(part, t, sd, k > 0, k + 1 < len(parts), measurements)
         when, places, seen_so = lay(sure)
         slow = [np.hypot(*way_at(when, places, edge)) < SLOW for edge in (0, -1)]  # seen surely, they only stand
         begin, end = part[0] if slow[0] else sure[0], part[-1] if slow[1] else sure[-1]
@@ -833,13 +833,27 @@ def way_at(t, places, end):
     return (places[last] - places[first]) / max(t[last] - t[first], 1e-9)
 
 
-def surely(part, t, sd, first, last):
-    """A stretch in sight (n,) without what is vague at its first or last moments, if much is left."""
+def surely(part, t, sd, first, last, places):
+    """A stretch in sight (n,) without what is vague at its first or last moments, if much is left.
+
+    Who stands there, half hidden, is seen vaguely for more than moments: that stays.
+    """
     good = part[sd[part] < VAGUE]
     if not len(good) or t[good[-1]] - t[good[0]] < BRIDGED:
         return part
-    begin, end = good[0] if first else part[0], good[-1] if last else part[-1]
+    before, after = part[part < good[0]], part[part > good[-1]]
+    begin = good[0] if first and not stays(t[before], places[before]) else part[0]
+    end = good[-1] if last and not stays(t[after], places[after]) else part[-1]
     return part[(part >= begin) & (part <= end)]
+
+
+def stays(t, places):
+    """Whether somebody was for more than a moment, and most of the time (n,), at one of the places (n, 2)."""
+    seen = np.isfinite(places[:, 0])
+    if not seen.any() or t[-1] - t[0] < PATIENCE:
+        return False
+    away = np.linalg.norm(places[seen] - np.median(places[seen], axis=0), axis=1)
+    return bool(np.median(away) < SAME_PLACE / 2)
 
 
 def bridge(t, places, velocities, when, pace):

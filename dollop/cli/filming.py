@@ -32,10 +32,12 @@ def write_film(path, run, task, background=None):
     What stands still is drawn once, by matplotlib; into each frame go the way so far and the robot.
     The same run gives the same bytes.
     """
+    from PIL import Image
+
     still, to_pixels = _still(run, task, background)
     rows = np.unique(np.linspace(0, len(run.t) - 1, min(FRAMES, len(run.t))).round().astype(int))
     frames = [_frame(still, to_pixels, run, row) for row in rows]
-    palette = frames[-1].quantize(colors=128, dither=0)
+    palette = frames[-1].quantize(colors=128, method=Image.Quantize.FASTOCTREE, dither=0)
     frames = [frame.quantize(palette=palette, dither=0) for frame in frames]
     seconds = np.diff(run.t[rows], append=run.t[-1]) * _pace(run, len(rows))
     shown = [max(20, int(10 * round(100 * each))) for each in seconds[:-1]] + [int(1000 * LAST)]

@@ -36,8 +36,9 @@ def run(options):
     with busy("learning"):
         task = dollop.learn(demonstrations, method=options.method)
     write_task(task, background, out, picture)
-    lines = (*_shown_lines(task, options.logs), *as_lines(task))
-    data = {**as_data(task), "errors": task.errors()}
+    errors = task.errors()
+    lines = (*_shown_lines(task, errors, options.logs), *as_lines(task))
+    data = {**as_data(task), "errors": errors}
     then = performing(out, options.map)
     tell(Result(lines, (out, picture), then, task.notes, data), options.json)
 
@@ -62,9 +63,9 @@ def _shown(path, user, background, options):
     return dollop.Demonstration.of(found)
 
 
-def _shown_lines(task, paths):
+def _shown_lines(task, errors, paths):
     """What each demonstration showed, and how far the task is from it."""
-    for path, shown, error in zip(paths, task.demonstrations, task.errors(), strict=True):
+    for path, shown, error in zip(paths, task.demonstrations, errors, strict=True):
         walked = sum(arc_length(walk)[-1] for walk in shown.walks)
         laps = f" in {len(shown.walks)} laps" if len(shown.walks) > 1 else ""
         apart = f"the task is {1000 * error:.0f} mm from it on average"

@@ -293,10 +293,11 @@ def _route(path, nodes, background):
     ways = np.array([node.get("way", 0) for _, node in nodes], int)
     waits = [node["wait"] for _, node in nodes if node.get("wait")]
     parts = {f"way {k}": places[ways == k] for k in np.unique(ways)}
-    (x0, y0), (x1, y1) = places[0], places[-1]
+    (x0, y0), (x1, y1) = parts["way 0"][[0, -1]]
+    lengths = [f"{arc_length(part)[-1]:.1f} m" for part in parts.values()]
     lines = (
-        f"{path}: a route of {len(places)} places, {len(parts)} ways",
-        f"way 0 is {arc_length(parts['way 0'])[-1]:.1f} m long",
+        f"{path}: a route of {len(places)} places",
+        f"ways of {', '.join(lengths)}, the one most often shown first",
         f"from ({x0:.2f}, {y0:.2f}) to ({x1:.2f}, {y1:.2f}) m",
         f"waits: {', '.join(f'{wait:.1f} s' for wait in waits) or 'none'}",
     )

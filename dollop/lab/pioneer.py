@@ -50,7 +50,8 @@ class Pioneer:
     Attributes
     ----------
     radius : float
-        Of a circle in m that covers it (ARIA, p2dx.p).
+        In m, of the circle round the middle of its axle, where its pose is, that covers it: the corners
+        of its tail are 0.26 m behind and 0.18 m aside. ARIA's 0.25 m (p2dx.p) are round its own middle.
     limits : Limits
     period : float
         Control period in s.
@@ -72,7 +73,7 @@ class Pioneer:
 
     wheel_radius, wheel_base = 0.0825, 0.317
     motor_torque = 8.0
-    radius = 0.25
+    radius = 0.32
 
     def __init__(
         self,

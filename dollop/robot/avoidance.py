@@ -23,6 +23,7 @@ import scipy
 
 from dollop.checks import FARTHEST, checked_number, put_in
 from dollop.gridmap import distances_to, in_cells, in_metres
+from dollop.trajectory import arc_length, at_arc_length
 
 __all__ = [
     "CREEPING", "FREE_BELOW", "PIONEER_AVOIDANCE", "PIONEER_RADIUS", "Avoidance", "Geodesic", "ObstacleMap", "towards",
@@ -412,8 +413,8 @@ class ObstacleMap:
         if edge > self.rules.tight:
             return ux, uy
         nx, ny = towards(nx, ny)
-        inwards = min(nx * ux + ny * uy, 0.0)
-        return towards(ux + (1 - inwards) * nx, uy + (1 - inwards) * ny)
+        more = 1 - edge / self.rules.tight - min(nx * ux + ny * uy, 0.0)
+        return towards(ux + more * nx, uy + more * ny)
 
     @cached_property
     def _passable(self):
@@ -486,7 +487,7 @@ class ObstacleMap:
                 raise ValueError(f"{name} must be free, {there} in an obstacle or unknown")
 
     def has_room(self, x, y, reach):
-        """Whether there is room for the robot near a place on the map.
+        """Whether there may be room for the robot near a place on the map, to a cell.
 
         Parameters
         ----------
@@ -499,7 +500,10 @@ class ObstacleMap:
         -------
         bool
         """
-        return reach > 0 and self.holds(x, y) and bool(self._passable[self._near((x, y), reach)].any())
+        if reach <= 0 or not self.holds(x, y):
+            return False
+        room = self.distances[self._near((x, y), reach + self.resolution)] - self.radius
+        return bool((room > self.rules.tight - self.resolution).any())
 
     def nearest_room(self, x, y):
         """Distance to the nearest place where the robot has room.
@@ -655,6 +659,48 @@ class Geodesic:
                 break
             cell = farther
         return towards(*self.obstacles._centre(cell), x, y)
+
+    def path(self, x, y, step):
+        """The way from a place, smoothed where there is room for it.
+
+        Parameters
+        ----------
+        x, y : float
+            In m.
+        step : float
+            Distance in m between its places.
+
+        Returns
+        -------
+        (M, 2) float array
+            In m, after the place itself, up to `goal`; none where there is no way.
+
+        Examples
+        --------
+        >>> from dollop.environment import Environment
+        >>> obstacles = ObstacleMap.of(Environment([]), places=[[0, 0], [1, 0]])
+        >>> Geodesic(obstacles, (1.0, 0.0)).path(0.0, 0.0, 0.5).round(1).tolist()
+        [[0.5, 0.0], [1.0, 0.0]]
+        """
+        cell = self.obstacles._cell(x, y)
+        if self._distances[cell] == inf:
+            return np.empty((0, 2))
+        cells = [cell]
+        while cells[-1] != self._goal_cell:
+            cells.append(self._before[cells[-1]])
+        raw = np.array(list(map(self.obstacles._centre, cells)))
+        if self.obstacles._passable.flat[self.obstacles._cell_at(x, y)]:
+            raw[0] = x, y
+        else:
+            raw = np.vstack([[x, y], raw])
+        width = 2 * round(AHEAD / self.obstacles.resolution / 2) + 1
+        even = scipy.ndimage.uniform_filter1d(raw, width, axis=0, mode="nearest")
+        even[[0, -1]] = raw[[0, -1]]
+        room = np.minimum(self.obstacles.edges(raw) - DIPS, self.obstacles.rules.kept)
+        even = np.where((self.obstacles.edges(even) < room)[:, None], raw, even)
+        way = arc_length(even)
+        at = np.append(np.arange(step, way[-1], step), way[-1])
+        return at_arc_length(even, at)
 
 
 def towards(x, y, from_x=0.0, from_y=0.0):

@@ -52,9 +52,7 @@ FARTHEST, LONGEST = 100.0, 10_000.0
 times as far as it is to the segment's line and along it; and in any case."""
 AT_ONCE = 1_000_000
 """Pairs of places that are compared at once."""
-OVER = 0.1
-"""Way in m over which the direction is taken in which a law leaves its start or comes to a subgoal."""
-AT_END = 2 * STEP
+AT_END = STEP
 """Distance in m from where a detour ends within which the robot has come there."""
 FACING = 0.1
 """Angle in rad within which a robot that stands looks where it should."""
@@ -225,12 +223,12 @@ class Guidance:
 
     def __init__(self, law, obstacles=None, rules=PIONEER_FOLLOWING):
         self.obstacles = obstacles
-        self._enough = max(rules.reach, obstacles.radius if obstacles else 0.0)
+        self._enough = rules.reach
         self.goals = [tuple(segment.goal.tolist()) for segment in law.segments]
         self._steps = [(segment.A - np.eye(2)).ravel().tolist() for segment in law.segments]
         self.lines = law.lines(STEP / 2)
         self.pauses = [0.0] * (len(self.goals) + 1) if law.pauses is None else law.pauses.tolist()
-        self.headings = headings_of(self.lines)
+        self.headings = law.headings.tolist()
         self._relative = None if law.profile is None else law.profile / np.asarray(law.speeds)[:, None]
         self._weights = [lyapunov_weights(segment.A) for segment in law.segments]
         self.detours, self._geodesics = {}, {}
@@ -301,8 +299,7 @@ class Guidance:
     def reached(self, k, x, y, reach):
         """Whether a robot is within reach of a subgoal, or of where the detour to it ends.
 
-        Such an end counts where the robot stands over the subgoal, or at the distance in which a
-        segment hands over.
+        Such an end counts where it is no farther from the subgoal than where a segment hands over.
 
         Parameters
         ----------
@@ -352,6 +349,9 @@ class Guidance:
 
         It is beside place `at` of the segment's line; by default beside the nearest.
         """
+        if self.detours.get(k):
+            places = list(map(tuple, self.detours[k].path(x, y, STEP).tolist()))
+            return places, self.reached(k, *(places[-1] if places else (x, y)), STEP)
         places, line = [], Held(self.lines[k], x, y, at)
         for _ in range(round(line.farthest / STEP)):
             if self.reached(k, x, y, STEP):
@@ -437,15 +437,6 @@ class Held:
             offset_x, offset_y = self.fading.offset(self.at)
             self.state = line_x + offset_x, line_y + offset_y
         return self.state
-
-
-def headings_of(lines):
-    """Directions (K + 1) in rad in which the lines of K segments leave the start and come to each subgoal."""
-    leaving = (
-        lines[0].places[np.searchsorted(lines[0].way, OVER, side="right") - len(lines[0].way)] - lines[0].places[0]
-    )
-    arriving = [line.places[-1] - line.places[np.searchsorted(line.way, line.way[-1] - OVER)] for line in lines]
-    return [atan2(y, x) for x, y in (leaving, *arriving)]
 
 
 def lyapunov_weights(A):

@@ -142,7 +142,7 @@ class Controller:
         self._keeper = WayKeeper(laws, shown, self._robot, control, chart, avoid, following)
         if avoid:
             self.known.check_room()
-        check_some_way(subgoals, self.known, self._keeper.enough if avoid else 0.0)
+        check_some_way(subgoals, self.known, following.reach if avoid else 0.0)
         self.reason, self.over = "", False
         self._notes, self._rows, self._times = self._robot.notes, [], []
         self._late = self._blind = self._leaping = 0.0

@@ -71,7 +71,7 @@ class Run:
         segment handed over. NaN if nobody tells.
     reached : (K,) bool array
         Which subgoals of the way in force at the end the robot came to: within the distance at
-        which a segment hands over, or its radius where that is more; 0.15 m more is left to a
+        which a segment hands over, or as near as there is room; 0.15 m more is left to a
         localisation. Empty if nobody tells.
     farthest : float
         Largest distance in m of the robot from the way in force, once it has come to it within that
@@ -269,7 +269,8 @@ class Driven:
     active, way : (N,) int arrays
         Segment and way in force.
     along, apart : (N,) float arrays
-        Way in m from the start to the nearest place on the segment in force, and the distance from it.
+        Way in m from the start to the nearest place on the segment in force, and the distance from it or
+        from the segment before.
     leaps : (N,) bool array
         Whether the robot was put there: at the start, and wherever it could not have driven.
     lines : dict of int to list of Line
@@ -294,6 +295,8 @@ class Driven:
             begun = sum(line.way[-1] for line in lines[w][:k])
             along[rows], apart[rows] = _beside(places[rows], lines[w][k])
             along[rows] += begun
+            if k:  # it may have handed over before its subgoal
+                apart[rows] = np.minimum(apart[rows], _beside(places[rows], lines[w][k - 1])[1])
         steps = np.hypot(*np.diff(places, axis=0).T)
         return cls(
             places,

@@ -326,11 +326,6 @@ class WayKeeper:
             return f"way {way} is closed"
         return "way {} was left at ({:.2f}, {:.2f})".format(way, *self.left[way])
 
-    @property
-    def enough(self):
-        """Float: the distance in m within which a robot must have room near a subgoal."""
-        return max(self.rules.reach, self.known.radius)
-
     def needs(self):
         """How near the robot must come to each subgoal of the way in force.
 
@@ -404,13 +399,13 @@ class WayKeeper:
         if self.obstacles is None:
             return ""
         for k, goal in enumerate(way.law.subgoals.tolist()[segment:], segment):
-            told = self.obstacles.no_way((x, y), goal, self.enough)
+            told = self.obstacles.no_way((x, y), goal, self.rules.reach)
             if told:
                 return told.format(f"subgoal {k}")
         return ""
 
     def look_closer(self):
-        """Map what is known to stand there by finer cells, between which narrower ways are found.
+        """Map what is known to stand there by finer cells, between which narrower ways lead straighter.
 
         Returns
         -------
@@ -473,7 +468,7 @@ class WayKeeper:
             self.supervisor.elapsed, self.supervisor.standing = elapsed, standing
             command = self.supervisor.command(x, y, theta)
         here = self.ways[self.way]
-        if self.hopeless and self.closed(here, self.active, x, y) and self.look_closer():
+        if self.hopeless and self.look_closer():
             self.enter(here, self.active)
         return command, self.supervisor.most
 

@@ -188,7 +188,7 @@ def test_a_task_is_exported_and_shown(to, suffix, room, capsys):
     told = json.loads(call(capsys, "export", "task.json", "--to", to, "--out", f"route{suffix}", "--json").out)
     assert told["deviation"] <= 0.01 and told["written"] == [f"route{suffix}"]
     shown = call(capsys, *said.next)
-    assert shown.status == 0 and "17.1 m long" in shown.out
+    assert shown.status == 0 and "ways of 17.1 m" in shown.out
 
 
 def test_an_unknown_target_lists_the_known_ones(room, capsys):

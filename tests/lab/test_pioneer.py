@@ -1,6 +1,7 @@
 """The Pioneer: it obeys, finds itself by odometry and laser, performs, and is kidnapped."""
 
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from rooms import figure_eight
 
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
-from dollop.lab.pioneer import Pioneer
+from dollop.lab.pioneer import URDF, Pioneer
 from dollop.lab.rooms import LABORATORY
 from dollop.lab.scenes import empty_scene, figure_eight_scene
 from dollop.lab.things import BEAM_HEIGHT
@@ -52,6 +53,11 @@ def velocity(robot):
     return vx * np.cos(theta) + vy * np.sin(theta), turn
 
 
+def numbers(texts):
+    """Texts of numbers with blanks between, as lists of floats."""
+    return [list(map(float, each.split())) for each in texts]
+
+
 COMMANDS = [(0.4, 0.0), (0.0, 1.0), (0.4, 0.5), (0.3, -0.8), (-0.3, 0.2)]
 
 
@@ -90,6 +96,15 @@ def test_without_a_map_the_pioneer_believes_the_truth(robot):
     """What it believes is where it is, at rest and after a drive, and it trusts that."""
     drive(robot, 0.4, 0.3, 1.0)
     assert robot.pose == robot.true_pose != tuple(robot.odometry) and robot.localised
+
+
+def test_the_radius_covers_the_robot(robot):
+    """No corner of the shapes that can touch something is farther from the pose, and one is as far to a centimetre."""
+    shapes = ElementTree.parse(URDF).iter("collision")
+    shapes = [(each.find("origin"), each.find("geometry/box")) for each in shapes]
+    boxes = [(origin.get("xyz"), box.get("size")) for origin, box in shapes if box is not None]
+    reach = [np.hypot(abs(x) + length / 2, abs(y) + width / 2) for (x, y, _), (length, width, _) in map(numbers, boxes)]
+    assert robot.radius - 0.01 < max(reach) <= robot.radius
 
 
 def test_a_collision_is_felt(robot):
