@@ -8,15 +8,16 @@ a robot of each radius with limits and a control period of its own that begins n
 kidnapped twice to places that are free for it (`benchmarks.furnished`). `dollop.perform` drives it.
 
 What came of it is judged by an oracle that knows nothing of how Dollop measures: exact distances to boxes and to
-occupied cells as squares, and a flood fill on a grid of 1.7 cm. A robot is *at* a subgoal where its disc covers it, or
-within 0.25 m. A *way of that width exists* where the start, all kidnapping poses and a place at each subgoal of one of
-the task's ways lie in one part of the floor that is nowhere nearer to anything than radius + margin; for the margins 0,
-2, 5 and 6.7 cm.
+occupied cells as squares, and a flood fill on a grid of 1.7 cm. A robot is *at* a subgoal within 0.25 m, which is where
+a segment hands over. A *way of that width exists* where the start, all kidnapping poses and a place at each subgoal of
+one of the task's ways lie in one part of the floor that is nowhere nearer to anything than radius + margin; for the
+margins 0, 2, 5 and 6.7 cm.
 
 touched      the exact clearance was below zero somewhere
 told_error   the largest difference in m between the clearance told and the exact one, where one of both is below 0.5 m
 wrong        finished, but was not at each of the last way's subgoals, to 5 cm, one after the other, nor ended there
-no_way       what came of the runs where no way of the robot's own width exists
+no_way       what came of the runs where no way of the robot's own width exists, and how many of the unfinished said so
+waits        of the pauses that were shown in runs that finished, how many the robot truly stood for, to a second
 
 With more `--kidnappings` than two they come every four seconds on average, to places from which there is a way that is
 6.7 cm wider than the robot: none of these runs may touch anything, or end unfinished. With `--steps` each run is driven
@@ -36,12 +37,15 @@ import pandas as pd
 import dollop
 from benchmarks.furnished import drawn
 
+RADII = 0.18, 0.25, 0.40
 MARGINS = 0.0, 0.02, 0.05, 0.067
 """m."""
 REACH, SLACK = 0.25, 0.05
-"""m: within which a robot is at a subgoal, however small it is, and how much farther off between two periods."""
+"""m: within which a robot is at a subgoal, and how much farther off it may seem between two periods."""
 USUAL, PAUSE = 2, 4.0
 """Kidnappings in a run; and, where there are more, s between two of them on average."""
+STILL, BRIEF = 1e-4, 1.0
+"""m in a period of a robot that stands; s by which a wait may be shorter than the one that was shown."""
 SLOW = 20.0
 """ms: a step that takes longer is slow."""
 GROUPS = ("radius",)
@@ -103,8 +107,7 @@ def places_with_a_way(rng, truth, task, start, radius, count):
     """Places (count, 2) in m with a way that is wider than the robot; none where there is none from its start."""
     parts = truth.parts(radius + MARGINS[-1])
     there = truth.part_at(parts, start, REACH)
-    reach = max(REACH, radius)
-    good = [k for k in there if any(connected(truth, parts, {k}, way.subgoals, reach) for way in task.ways)]
+    good = [k for k in there if any(connected(truth, parts, {k}, way.subgoals) for way in task.ways)]
     rows, columns = np.nonzero(np.isin(parts, good))
     if not good:
         return np.empty((0, 2))
@@ -131,22 +134,22 @@ def margin_of(room, task, radius, poses):
     for margin in MARGINS:
         parts = room.now.parts(radius + margin)
         common = set.intersection(*(room.now.part_at(parts, pose[:2]) for pose in poses))
-        if not any(connected(room.now, parts, common, way.subgoals, max(REACH, radius)) for way in task.ways):
+        if not any(connected(room.now, parts, common, way.subgoals) for way in task.ways):
             break
         held = margin
     return held
 
 
-def connected(truth, parts, common, subgoals, reach):
-    """Whether one of some parts of the floor comes so near in m to each subgoal (K, 2)."""
+def connected(truth, parts, common, subgoals):
+    """Whether in one of some parts of the floor a robot can be at each subgoal (K, 2)."""
     for subgoal in subgoals:
-        common = common & truth.part_at(parts, subgoal, reach)
+        common = common & truth.part_at(parts, subgoal, REACH)
     return bool(common)
 
 
-def missed(run, task, radius):
+def missed(run, task):
     """Why a run that says it finished did not, or nothing; what it had done on another way counts as done."""
-    way, within = int(run.way[-1]), max(REACH, radius) + SLACK
+    way, within = int(run.way[-1]), REACH + SLACK
     subgoals, first, now = task.ways[way].subgoals, int(np.append(np.flatnonzero(run.way != way), -1).max()) + 1, 0
     places = run.true_poses[first:, :2]
     for k in range(int(run.active[first]) if first else 0, len(subgoals)):
@@ -163,7 +166,7 @@ def judged(room, task, radius, control="pursuit", kidnappings=USUAL, steps=False
     row = {"seed": room.seed, "radius": radius, "kind": room.kind, "made": ", ".join(room.made)}
     ready = robot_in(room, task, radius, kidnappings)
     if ready is None:
-        return row | {"outcome": "no place to stand"}, None
+        return row | {"outcome": "no way from the start" if kidnappings > USUAL else "no place to stand"}, None
     robot, kidnap = ready
     poses = [robot.pose, *(pose for _, pose in kidnap)]
     row |= {"margin": margin_of(room, task, radius, poses), "subgoals": len(task.law.subgoals), "period": robot.period}
@@ -208,7 +211,7 @@ def measures(room, task, radius, run):
     exact = room.now.distance(run.true_poses) - radius
     near = (exact < FAR) | (run.clearance < FAR)
     away = np.abs(run.clearance - exact)[near]
-    wrong = missed(run, task, radius) if run.finished else ""
+    wrong = missed(run, task) if run.finished else ""
     found = {
         "outcome": "wrong" if wrong else "finished" if run.finished else "not finished",
         "reason": wrong or run.reason,
@@ -220,11 +223,21 @@ def measures(room, task, radius, run):
         "kidnapped": len(run.kidnapped),
         "seconds": run.t[-1],
         "periods": len(run.t),
+        "waits": len(run.waits),
+        "kept": sum(stood_at(run, task, int(k)) > shown - BRIEF for k, shown, _ in run.waits),
     }
     with suppress(AttributeError):  # a run may tell more than it must
         found |= {"done": run.done, "reached": int(np.sum(run.reached)), "farthest": run.farthest}
         found["notes"] = "; ".join(note.kind for note in run.notes)
     return found
+
+
+def stood_at(run, task, k):
+    """How long in s a robot truly stood within 0.5 m of the start of its last way (k = 0) or of its k-th subgoal."""
+    way, places = task.ways[int(run.way[-1])], run.true_poses[:, :2]
+    there = np.hypot(*(places - [way.start, *way.subgoals][k]).T) < 2 * REACH
+    still = np.hypot(*np.diff(places, axis=0).T) < STILL
+    return float(np.diff(run.t)[still & there[1:]].sum())
 
 
 # ---- rows, tables, pictures
@@ -273,6 +286,8 @@ def of_radius(radius, part):
     line |= {"touched": int(ran.touched.sum()), "told_touched": int((ran.collisions > 0).sum())}
     line |= {"wrong": int((part.outcome == "wrong").sum()), "crashed": int((part.outcome == "crashed").sum())}
     line |= {"told_error": ran.told_error.max(), "step_ms": ran.step_ms.median(), "step_ms_max": ran.step_ms.max()}
+    done = part[part.outcome == "finished"]
+    line["waits"] = f"{done.kept.sum():.0f}/{done.waits.sum():.0f}"
     line |= {"kidnappings": int(ran.kidnapped.sum()), "periods": int(ran.periods.sum())}
     if "same" in ran:
         line |= {"same": f"{(ran.same == True).sum()}/{len(ran)}", "beyond": int((ran.within_limits == False).sum())}  # noqa: E712
@@ -337,7 +352,7 @@ def write_failures(table, folder):
 def parsed(arguments=None):
     """What the command line asks for."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.driving", description=__doc__.split("\n")[0])
-    parser.add_argument("--radius", type=float, nargs="+", default=[0.18, 0.25, 0.40], help="in m")
+    parser.add_argument("--radius", type=float, nargs="+", help="in m, default: 0.18 0.25 0.4; the Pioneer's own")
     parser.add_argument("--first", type=int, default=0, help="seed")
     parser.add_argument("--count", type=int, help="of seeds, default: 100, and 30 with --pybullet")
     parser.add_argument("--control", default="pursuit", choices=["pursuit", "plain"])
@@ -355,12 +370,14 @@ def main(arguments=None):
     if options.pybullet:
         from benchmarks import driving_lab as course
 
-        jobs = [joblib.delayed(course.rows_of)(seed) for seed in seeds_of(options, 30)]
+        radii = options.radius or [course.Pioneer.radius]
+        jobs = [joblib.delayed(course.rows_of)(seed, radii) for seed in seeds_of(options, 30)]
     else:
         from benchmarks import driving as course
 
         how = {name: getattr(options, name) for name in ("control", "kidnappings", "steps", "pictures")}
-        jobs = [joblib.delayed(course.rows_of)(seed, options.radius, **how) for seed in seeds_of(options, 100)]
+        radii = options.radius or RADII
+        jobs = [joblib.delayed(course.rows_of)(seed, radii, **how) for seed in seeds_of(options, 100)]
     if options.pictures:
         Path(options.pictures).mkdir(parents=True, exist_ok=True)
     parts = joblib.Parallel(options.workers)(jobs)

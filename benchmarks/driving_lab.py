@@ -10,6 +10,7 @@ is what the physics feel.
 """
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,7 @@ from dollop.lab import Pioneer, World, record_tour, walk_of
 from dollop.lab.outlines import outline_distances
 from dollop.replication.worlds.draw import draw
 
-GROUPS = ("kidnappings",)
+GROUPS = ("radius", "kidnappings")
 MARGINS = 0.0, 0.02, 0.05, 0.067
 STEP, REACH, TIMEOUT = 0.03, 0.25, 400.0
 """m between the points of the flood fill, m within which a segment hands over, s."""
@@ -104,29 +105,32 @@ def poses_in(ground, task, seed, radius):
     return start, (float(rng.uniform(2.0, max(0.8 * lasting, 4.0))), tuple(map(float, pose)))
 
 
-def rows_of(seed, kidnappings=(0, 1)):
-    """A row for each number of kidnappings in the room of a seed."""
+def rows_of(seed, radii, kidnappings=(0, 1)):
+    """A row for each radius that the Pioneer is taken to have, and number of kidnappings, in the room of a seed."""
     world = draw(seed)
-    head = {"seed": seed, "kind": world.kind, "room": world.shape}
+    head, cases = {"seed": seed, "kind": world.kind, "room": world.shape}, list(product(radii, kidnappings))
     try:
         task = task_of(world)
     except ValueError as error:
-        return [head | {"kidnappings": n, "outcome": "not learned", "reason": str(error)} for n in kidnappings]
+        why = {"margin": np.nan, "outcome": "not learned", "reason": str(error)}
+        return [head | {"radius": radius, "kidnappings": n} | why for radius, n in cases]
     background = dollop.OccupancyGrid.from_log(record_tour(world.empty, world.tour, [seed, 20]))
     ground = Ground(world.later)
-    return [head | driven(world, task, background, ground, n) for n in kidnappings]
+    return [head | driven(world, task, background, ground, *case) for case in cases]
 
 
-def driven(world, task, background, ground, kidnappings):
+def driven(world, task, background, ground, radius, kidnappings):
     """What came of one run."""
-    start, kidnapping = poses_in(ground, task, world.seed, Pioneer.radius)
+    start, kidnapping = poses_in(ground, task, world.seed, radius)
     kidnap = [kidnapping][:kidnappings]
     places = [start[:2], *(pose[:2] for _, pose in kidnap)]
-    row = {"kidnappings": kidnappings, "margin": ground.margin(places, task.law.subgoals, Pioneer.radius)}
+    row = {"radius": radius, "kidnappings": kidnappings}
+    row |= {"margin": ground.margin(places, task.law.subgoals, radius)}
     scanner = world.later.robot.scanner
     scanner = replace(scanner, model=f"{scanner.model}, thinned", rate=min(10.0, scanner.rate))
     with World(replace(world.later, people=(), moves=())) as room:
         robot = Pioneer(room, start, background, task.environment, [world.seed, 50], scanner=scanner)
+        robot.radius = radius
         try:
             run = dollop.perform(task, robot, background=background, kidnap=kidnap, timeout=TIMEOUT)
         except ValueError as error:
@@ -136,7 +140,7 @@ def driven(world, task, background, ground, kidnappings):
 
 def measures(run, ground, task):
     """What the truth says of a run, and the run of itself."""
-    exact = ground.distance(run.true_poses[:, :2]) - Pioneer.radius
+    exact = ground.distance(run.true_poses[:, :2]) - run.radius
     off, period = np.hypot(*(run.poses - run.true_poses)[run.localised, :2].T), run.t[-1] / max(len(run.t) - 1, 1)
     end = np.hypot(*(run.true_poses[-1, :2] - task.ways[int(run.way[-1])].subgoals[-1]))
     return {
@@ -155,19 +159,15 @@ def measures(run, ground, task):
 
 
 def summary(table):
-    """One row per number of kidnappings."""
+    """One row per radius and number of kidnappings."""
     rows = []
-    for kidnappings, part in table.groupby("kidnappings"):
-        way = part[part.margin >= 0]
-        rows.append({
-            "kidnappings": kidnappings,
-            "runs": len(part),
-            "finished": int((part.outcome == "finished").sum()),
-            "where_a_way": f"{(way.outcome == 'finished').sum()}/{len(way)}",
-            "touched": int((part.touched > 0).sum()),
-            "least_clearance": part.clearance.min(),
-            "farthest_end": part[part.outcome == "finished"].end.max(),
-            "pose_error": part.pose_error.mean(),
-            "longest_wrong_s": part.wrong_s.max(),
-        })  # fmt: skip
+    for (radius, kidnappings), part in table.groupby(["radius", "kidnappings"]):
+        row = {"radius": radius, "kidnappings": kidnappings, "runs": len(part)}
+        row["finished"] = int((part.outcome == "finished").sum())
+        for margin in MARGINS:
+            some = part[part.margin >= margin]
+            row[f"way_{100 * margin:g}cm"] = f"{(some.outcome == 'finished').sum()}/{len(some)}"
+        row |= {"touched": int((part.touched > 0).sum()), "least_clearance": part.clearance.min()}
+        row |= {"farthest_end": part[part.outcome == "finished"].end.max(), "pose_error": part.pose_error.mean()}
+        rows.append(row | {"longest_wrong_s": part.wrong_s.max()})
     return pd.DataFrame(rows)

@@ -37,6 +37,8 @@ READINGS, POINTS = 100_000, 1_000_000
 MOST_ALONG = 1_000_000
 SIDES = 1e-6, 1e3
 """m: cells of a map are neither smaller nor larger."""
+AT_ONCE = 1 << 13
+"""Cells whose distances are taken at once: they stay in a processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -645,7 +647,7 @@ def covered_cells(boxes, origin, resolution, shape):
 def distances_to(cells, side=1.0, reach=0.0):
     """Distance of the centre of every cell of a grid to the nearest of some cells, their centres or their edges.
 
-    Row by row, so that next to the result it takes 9 bytes a cell for a moment (SciPy's own 48).
+    Some rows at once, so that next to the result it takes 9 bytes a cell for a moment (SciPy's own 48).
 
     Parameters
     ----------
@@ -669,9 +671,12 @@ def distances_to(cells, side=1.0, reach=0.0):
     asked = {"return_distances": False, "return_indices": True}
     nearest = scipy.ndimage.distance_transform_edt(~cells, side, **asked)
     distances, columns = np.empty(cells.shape), np.arange(cells.shape[1])
-    for row, (near_row, near_column) in enumerate(zip(*nearest, strict=True)):
-        down, right = (near_row - row) * side, (near_column - columns) * side
+    some = max(AT_ONCE // max(cells.shape[1], 1), 1)
+    for row in range(0, len(cells), some):
+        near_row, near_column = nearest[:, row : row + some]
+        rows = np.arange(row, row + len(near_row))[:, None]
+        down, right = (near_row - rows) * side, (near_column - columns) * side
         if reach:
             down, right = (np.maximum(np.abs(each) - reach, 0) for each in (down, right))
-        np.sqrt(down * down + right * right, out=distances[row])
+        np.sqrt(down * down + right * right, out=distances[row : row + some])
     return distances

@@ -10,6 +10,7 @@ Everything is drawn into axes that are given; a label goes into their legend onc
 
 from io import BytesIO
 from itertools import pairwise
+from string import ascii_lowercase
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -411,8 +412,7 @@ def task(ax, task):
         label = None
     law(ax, task.law.response(), "way of the task")
     subgoals(ax, task.law.subgoals)
-    for k, place in enumerate(task.law.subgoals, 1):
-        _write(ax, k, place, (6, 5), weight="bold")
+    _numbers(ax, task.law)
     ax.plot(
         *task.law.start,
         "o",
@@ -431,6 +431,12 @@ def _numbered_boxes(ax, environment):
     for k, (x0, y0, x1, y1) in enumerate(environment.boxes):
         middle = ((x0 + x1) / 2, (y0 + y1) / 2)
         _write(ax, k, middle, (0, 0), color=OBSTACLE, ha="center", va="center", weight="bold")
+
+
+def _numbers(ax, law):
+    """The number of each subgoal of a law, from 1 on."""
+    for k, place in enumerate(law.subgoals, 1):
+        _write(ax, k, place, (6, 5), weight="bold")
 
 
 _LEAST_FOLLOWED = 0.25
@@ -485,14 +491,22 @@ def run(ax, run, task=None):
         ):
             if flags.any():
                 ax.plot(*way.subgoals[flags].T, "x", color=look, **_CROSS, label=f"subgoals, {label}")
+        _numbers(ax, way)
         _waits(ax, way, run.waits)
     places, leaps = run.true_poses[:, :2], _leaps(run)
     for n, part in enumerate(np.split(places, leaps)):
         path(ax, part, None if n else "robot", RUN, linewidth=1.6)
     for n, leap in enumerate(leaps):
-        path(ax, places[leap - 1 : leap + 1], None if n else "kidnapped", "black", linestyle=":")
+        path(
+            ax,
+            places[leap - 1 : leap + 1],
+            None if n else "kidnapped: a, b, …",
+            "black",
+            linestyle=":",
+        )
         ax.plot(*places[leap], "o", color="black", markersize=4, zorder=6)
-        _write(ax, n + 1, places[leap], (0, 9), ha="center", va="center", weight="bold")
+        letter = ascii_lowercase[n % len(ascii_lowercase)]
+        _write(ax, letter, places[leap], (0, 9), ha="center", va="center", weight="bold")
     _contacts(ax, [run] if run.collisions else [])
     known = run.true_poses[np.isfinite(run.true_poses).all(axis=1)]
     if len(known):

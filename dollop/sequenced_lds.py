@@ -80,7 +80,8 @@ class SequencedLDS:
         Speed in each of M equal parts of each segment's way, m/s, such that the time at the end of
         each part is the demonstrated one; by default `speeds` all along.
     pauses : (K + 1,) float array, optional
-        How long the demonstrators stood at the start and at each subgoal, s; by default not at all.
+        How long the demonstrators stood at the start and at each subgoal, s; by default not at all. In
+        a task it is 0 at both ends (`without_waits_at_ends`).
     corners : (K,) bool array, optional
         Whether a corner was shown at each subgoal, or a stop; elsewhere the direction of the
         response is continuous. By default there is none.
@@ -186,6 +187,11 @@ class SequencedLDS:
         breaks these rules least, the first among equals, and nothing is said of it: `errors` tells
         whether the tolerance is kept. So it may be where a walk has loops of a few decimetres. The
         same walks always give the same law.
+
+        Who stays for a second and more within 5 cm of a place pauses there (beyond the paper; samples
+        may scatter by 3 cm along each axis). Where at least half of the walks do, there is a subgoal,
+        and `pauses` has the mean over all walks, of which those that go on count as 0 s. Of one walk,
+        stands within half a metre of the way are one pause; those so near to an end are at the end.
 
         Parameters
         ----------

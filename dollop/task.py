@@ -154,6 +154,11 @@ def _of_one_way(laps):
 class Task:
     """A control law whose subgoals are tied to objects (Sec. IV-B and V).
 
+    Where the demonstrators paused on their way, the law waits (beyond the paper): a pause is a
+    subgoal, and lasts as long as the mean over the walks that go there, if half of them pause. Its
+    place moves with the objects that it follows, its length stays. Who stands before the first step
+    or after the last waits for the recording: that is none of the task.
+
     Attributes
     ----------
     law : SequencedLDS
@@ -511,7 +516,8 @@ def learn(demonstrations, environment=None, matchings=None, method="anchored", s
     Parameters
     ----------
     demonstrations : sequence of Demonstration
-        One at least; one alone is the task.
+        One at least; one alone is the task. Where half of those of a way paused, it pauses for the
+        mean (see `Task`).
     environment : Environment, optional
         The environment to learn in; that of the first demonstration by default.
     matchings : sequence of (Matching or None), optional

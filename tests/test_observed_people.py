@@ -10,7 +10,18 @@ from rooms import ANGLES, CANS, disc_scans, drawn_map, legs, nobody, room_map, s
 
 from dollop.laser import LaserLog
 from dollop.observation import observe
-from dollop.people import DOUBTFUL, Candidate, Followed, best_assignment, bridge, candidates
+from dollop.people import (
+    DOUBTFUL,
+    SURE,
+    VAGUE,
+    Candidate,
+    Followed,
+    best_assignment,
+    bridge,
+    candidates,
+    smooth_in_sight,
+)
+from dollop.tracking import Motion
 from dollop.trajectory import arc_length
 
 LONG = [2.6, 2.5, 4.0, 3.0]
@@ -222,6 +233,26 @@ def test_somebody_who_stands_among_boxes_is_no_box_once_they_walked():
     observation = observe(log, room_map())
     assert observation.people == (observation.user,) and len(observation.environment) == 2
     assert len(observation.user) == len(log) and errors(observation.user, log, way[:, 0]).max() < 0.3
+
+
+def half_hidden(seconds, speed=0.8):
+    """Times, middles (n, 2), deviations, truth: out of sight for 0.8 s, vaguely seen to stand, and gone on."""
+    x = np.concatenate(
+        [np.arange(-2.0, 0.0, speed / 10), np.zeros(8 + round(10 * seconds)), np.arange(0.0, 2.0, speed / 10)]
+    )
+    measured = np.column_stack([x, 0 * x]) + np.random.default_rng(0).normal(0, 0.01, (len(x), 2))
+    sd = np.where((x == 0) | (x > 1.7), VAGUE, SURE)
+    measured[np.flatnonzero(x == 0)[:8]] = np.nan
+    return np.arange(len(x)) / 10, measured, sd, x
+
+
+@pytest.mark.parametrize("seconds", [2.0, 12.0])
+def test_who_stands_half_hidden_stands(seconds):
+    """Seen vaguely all the while, at the edge of something: the way does not leave the place."""
+    t, measured, sd, x = half_hidden(seconds)
+    places, _ = smooth_in_sight(t, measured, Motion(), sd)
+    assert np.hypot(*places[(x == 0)][8:].T).max() < 0.25
+    assert np.median(np.hypot(*places[x == 0].T)) < 0.03
 
 
 def test_mixed_pixels_at_the_edges_of_boxes_are_nobody():

@@ -233,7 +233,7 @@ def test_waits_are_told_in_seconds(ax):
 
 
 def test_a_run_shows_what_it_reached_and_where_it_was_carried(ax):
-    """Subgoals that were not reached are grey; kidnappings are numbered leaps; the robot has its size."""
+    """Subgoals have numbers, and are grey if not reached; kidnappings are lettered leaps; the robot has its size."""
     task = learned([0.0, 2.0, 0.0, 0.0])
     background = room_map()
     robot = Unicycle((*task.law.start, 0.0), radius=0.3)
@@ -245,6 +245,7 @@ def test_a_run_shows_what_it_reached_and_where_it_was_carried(ax):
     assert len(crosses["subgoals, not reached"]) == (~done.reached).sum() > 0
     (leap,) = [line.get_xydata() for line in ax.lines if line.get_linestyle() == ":"]
     np.testing.assert_allclose(leap[1], (3.0, 3.0), atol=1e-9)
+    assert {"a", "1", "2"} <= set(written(ax)) and "b" not in written(ax)
     (rim,) = [patch for patch in ax.patches if isinstance(patch, Circle)]
     assert rim.radius == 0.3 and rim.center == pytest.approx(tuple(done.true_poses[-1, :2]))
 

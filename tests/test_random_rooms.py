@@ -73,10 +73,10 @@ def crossing(width, radius, kidnap=()):
 def test_what_finished_was_at_every_subgoal():
     """A run through a wide door misses nothing; cut off before the end, or judged by another way, it does."""
     run, task, _ = crossing(0.9, 0.18)
-    assert run.finished and not driving.missed(run, task, 0.18)
+    assert run.finished and not driving.missed(run, task)
     far = [[0.3, 2.7], *task.law.subgoals[:-1], task.law.subgoals[-1] + [0.0, 1.0]]
     another = type("Another", (), {"ways": (type("Law", (), {"subgoals": np.array(far)}),)})
-    assert driving.missed(run, another, 0.18).startswith("subgoal 0 missed by")
+    assert driving.missed(run, another).startswith("subgoal 0 missed by")
 
 
 def test_a_loop_of_its_own_asks_for_the_same():

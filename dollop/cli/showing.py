@@ -6,13 +6,14 @@ from functools import partial
 import numpy as np
 
 import dollop
+from dollop.checks import checked_array
 from dollop.cli.learning import as_data, as_lines
 from dollop.cli.performing import verdict_of
 from dollop.cli.picturing import of_run, of_task, write_picture
 from dollop.cli.telling import Result, busy, command, named, tell
 from dollop.cli.watching import check_kind, load_map, map_files
 from dollop.formats import kinds
-from dollop.formats.files import FormatError, read_json, read_lines
+from dollop.formats.files import FormatError, from_file, read_bytes, read_json, read_lines
 from dollop.formats.writing import Output, check_outputs
 from dollop.trajectory import arc_length
 
@@ -20,6 +21,8 @@ __all__ = ["run"]
 
 MOST_POINTS = 60_000
 """Readings of a log that are drawn, of scans at equal distances: more look the same."""
+MOST_YAML, MOST_VALUES = 8 << 20, 1_000_000
+"""Bytes and values of waypoints that are read."""
 TABLES = kinds.TRAJECTORY, kinds.EVERYBODY, kinds.TRUTH
 PAIRS = ("x", "y"), ("object_x", "object_y"), ("laser_x", "laser_y")
 """Columns of tables that are positions."""
@@ -260,40 +263,70 @@ def _draw_walks(ax, walks, background):
 
 
 def _graph(path, options, background):
-    features = read_json(path, "a route graph").get("features", [])
-    points = [each for each in features if each["geometry"]["type"] == "Point"]
-    return _route(
-        path,
-        [(each["geometry"]["coordinates"], each["properties"]["metadata"]) for each in points],
-        background,
-    )
+    nodes = from_file(path, _of_written, _graph_nodes, read_json(path, "a route graph"))
+    return _route(path, nodes, background)
+
+
+def _graph_nodes(content):
+    """Places and metadata of a route graph's points."""
+    points = [each for each in content["features"] if each["geometry"]["type"] == "Point"]
+    return [(each["geometry"]["coordinates"], each["properties"]["metadata"]) for each in points]
 
 
 def _waypoints(path, options, background):
     import yaml
 
-    content = yaml.safe_load(b"".join(read_lines(path)))
-    ways = [content["waypoints"], *(each["waypoints"] for each in content.get("other_ways", []))]
-    nodes = [node for way in ways for node in way.values()]
-    return _route(path, [(node["pose"][:2], node) for node in nodes], background)
-
-
-def _path(path, options, background):
-    columns = _columns(path)
-    rows = zip(columns["x"], columns["y"], columns["wait"], columns["way"], strict=True)
-    nodes = [((x, y), {"wait": wait, "way": way}) for x, y, wait, way in rows]
+    content = read_bytes(path, MOST_YAML)
+    from_file(path, _check_yaml, content)
+    nodes = from_file(path, _of_written, _waypoint_nodes, yaml.safe_load(content))
     return _route(path, nodes, background)
 
 
+def _check_yaml(content):
+    """Refuse a YAML that grows as it is read, before it is."""
+    from dollop.formats.plain_yaml import plain_nodes
+
+    for _ in plain_nodes(content, MOST_VALUES):
+        pass
+
+
+def _waypoint_nodes(content):
+    """Places and what else is told of the waypoints of all ways."""
+    ways = [content["waypoints"], *(each["waypoints"] for each in content.get("other_ways", []))]
+    for k, way in enumerate(ways):
+        for node in way.values():
+            yield node["pose"][:2], {"wait": node["wait"], "way": k}
+
+
+def _path(path, options, background):
+    return _route(path, from_file(path, _of_written, _path_nodes, _columns(path)), background)
+
+
+def _path_nodes(columns):
+    """Places, waits and ways of a path."""
+    rows = zip(columns["x"], columns["y"], columns["wait"], columns["way"], strict=True)
+    return [((x, y), {"wait": wait, "way": way}) for x, y, wait, way in rows]
+
+
+def _of_written(read, content):
+    """What is read of a route that was written by `dollop.export`: places (N, 2), waits and ways (N,)."""
+    try:
+        nodes = list(read(content))
+        columns = [(*place[:2], told["wait"], told["way"]) for place, told in nodes]
+    except (AttributeError, IndexError, KeyError, TypeError) as error:
+        raise ValueError(f"no route as dollop export writes it: {type(error).__name__} {error}") from None
+    columns = checked_array("the nodes of a route", columns, "N", 4)
+    if not len(columns):
+        raise ValueError("a route must have a node, got none")
+    return columns[:, :2], columns[:, 2], columns[:, 3].astype(int)
+
+
 def _route(path, nodes, background):
-    """A route by its nodes: place, and a dict with `wait` in s and perhaps its `way`."""
-    if not nodes:
-        raise FormatError("a route must have a node, got none", path)
-    places = np.array([place for place, _ in nodes], float)
-    ways = np.array([node.get("way", 0) for _, node in nodes], int)
-    waits = [node["wait"] for _, node in nodes if node.get("wait")]
+    """A route by the places (N, 2) of its nodes in m, their waits in s and their ways."""
+    places, waits, ways = nodes
+    waits = waits[waits > 0].tolist()
     parts = {f"way {k}": places[ways == k] for k in np.unique(ways)}
-    (x0, y0), (x1, y1) = parts["way 0"][[0, -1]]
+    (x0, y0), (x1, y1) = next(iter(parts.values()))[[0, -1]]
     lengths = [f"{arc_length(part)[-1]:.1f} m" for part in parts.values()]
     lines = (
         f"{path}: a route of {len(places)} places",

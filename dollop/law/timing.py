@@ -30,8 +30,6 @@ QUIET, NOISY = 0.01, 0.03
 a laser's track of somebody who stands scatters by 0.5 cm, and by some centimetres where it is seen badly."""
 GONE = 0.2
 """m: who has not been so far away between two stands has not gone; it is less than the length of a foot."""
-CREEP = 1e-3
-"""m: two samples of a place are no nearer to each other."""
 ROUNDS = 3
 """How often a middle is sought anew: then it hardly moves any more."""
 APART, SHARE = 0.5, 0.1
@@ -266,7 +264,7 @@ def _narrowed(walk, first, last, width):
 def _of_the_place(samples):
     """Which of some samples (N, 2) are not steps to or from the place where most of them are."""
     away = np.hypot(*(samples - _middle(samples)).T)
-    return np.flatnonzero(away <= np.clip(2 * np.median(away), CREEP, STILL))
+    return np.flatnonzero(away <= np.clip(2 * np.median(away), QUIET, STILL))
 
 
 def _middle(samples):

@@ -387,12 +387,27 @@ class ObstacleMap:
         float
             In m/s.
         """
+        return self.edge_and_limit(x, y, theta, deceleration, period)[1]
+
+    def edge_and_limit(self, x, y, theta, deceleration, period):
+        """`edge` and `speed_limit` in one.
+
+        Parameters
+        ----------
+        x, y, theta, deceleration, period : float
+            See there.
+
+        Returns
+        -------
+        (float, float)
+            In m and m/s.
+        """
         edge, nx, ny = self._edge_and_slope(x, y)
         left = min(self.rules.tight / 2, 0.02)
         room, outwards = edge - left, nx * cos(theta) + ny * sin(theta)
         speed = deceleration * (sqrt(period * period + 2 * max(room, 0.0) / deceleration) - period)
         creeps = outwards > (0.05 if room < -left / 2 else -0.05)
-        return max(speed, CREEPING) if creeps else speed
+        return edge, max(speed, CREEPING) if creeps else speed
 
     def outwards(self, x, y, ux, uy):
         """A direction, led off what is near where there is next to no room (reconstruction).

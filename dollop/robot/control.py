@@ -23,6 +23,7 @@ The paper gives neither the rule of handing over nor a controller: both are reco
 from bisect import bisect_right
 from collections import namedtuple
 from dataclasses import dataclass
+from functools import cached_property
 from math import atan2, copysign, cos, dist, inf, pi, sin, sqrt
 
 import numpy as np
@@ -42,7 +43,6 @@ __all__ = [
     "Following",
     "Guidance",
     "Limits",
-    "clip",
 ]
 
 STEP = 0.05
@@ -166,27 +166,6 @@ PIONEER_LIMITS = Limits(0.5, 0.8, 0.5, 1.57)
 """Of a Pioneer 2 DX: speeds by CARMEN (p2d8+), accelerations by Stage (pioneer.inc)."""
 
 
-def clip(value, limit):
-    """A number cut to a range round zero.
-
-    Parameters
-    ----------
-    value, limit : float
-        Of one unit.
-
-    Returns
-    -------
-    float
-        In [-limit, limit].
-
-    Examples
-    --------
-    >>> clip(-0.7, 0.5), clip(0.2, 0.5)
-    (-0.5, 0.2)
-    """
-    return max(-limit, min(limit, value))
-
-
 class Guidance:
     """The direction of a sequenced LDS at any state (Sec. III), round obstacles if it is given any.
 
@@ -222,16 +201,20 @@ class Guidance:
     """
 
     def __init__(self, law, obstacles=None, rules=PIONEER_FOLLOWING):
-        self.obstacles = obstacles
+        self.law, self.obstacles = law, obstacles
         self._enough = rules.reach
         self.goals = [tuple(segment.goal.tolist()) for segment in law.segments]
         self._steps = [(segment.A - np.eye(2)).ravel().tolist() for segment in law.segments]
         self.lines = law.lines(STEP / 2)
         self.pauses = [0.0] * (len(self.goals) + 1) if law.pauses is None else law.pauses.tolist()
-        self.headings = law.headings.tolist()
         self._relative = None if law.profile is None else law.profile / np.asarray(law.speeds)[:, None]
         self._weights = [lyapunov_weights(segment.A) for segment in law.segments]
         self.detours, self._geodesics = {}, {}
+
+    @cached_property
+    def headings(self):
+        """List of K + 1 float: see the attributes."""
+        return self.law.headings.tolist()
 
     def direction(self, k, x, y):
         """Direction in which a segment sends a robot (Sec. III).
@@ -478,8 +461,11 @@ class Supervisor:
         Time in s since the last command.
     standing : bool
         Whether the robot has been told to stand.
-    most : float
-        Speed in m/s from which it can still brake in time.
+    leapt : bool
+        Whether the last pose was one that no robot drives to in a period.
+    edge, most : float
+        How far in m it is from what is nearest, and the speed in m/s from which it can still brake in
+        time.
     """
 
     def __init__(self, guidance, speeds, robot, rules=PIONEER_FOLLOWING):
@@ -492,7 +478,8 @@ class Supervisor:
         self.gain = min(rules.turn_gain, 1 / self.period)
         self.patience = max(rules.patience, 2 * pi / self.limits.turn, 4 * STEP / self.limits.speed)
         self.jump = max(rules.jump, 2 * self.limits.speed * self.period)
-        self.last, self.most = None, inf
+        self.last, self.leapt, self.edge, self.most = None, False, inf, inf
+        self.tight = guidance.obstacles.rules.tight if guidance.obstacles else 0.0
         self.expect_to_wait(0)
         self.restart()
 
@@ -508,7 +495,8 @@ class Supervisor:
 
     def notice_kidnapping(self, x, y):
         """Begin the segment in force afresh where the robot finds itself elsewhere."""
-        if self.last and dist(self.last, (x, y)) > self.jump:
+        self.leapt = self.last is not None and dist(self.last, (x, y)) > self.jump
+        if self.leapt:
             if self.waits and self.waits[0][0]:  # carried off while it stood: back there
                 self.active, self.handed_over, self.waits = self.waits[0][0] - 1, False, []
             self.restart()
@@ -583,13 +571,11 @@ class Supervisor:
             CREEPING,
         )
 
-    def safe(self, speed, x, y, theta):
-        """The speed in m/s, or less where it could not be braked in time."""
-        if not self.guidance.obstacles:
-            return speed
-        braking = self.limits.acceleration, self.period
-        self.most = self.guidance.obstacles.speed_limit(x, y, theta, *braking)
-        return min(speed, self.most)
+    def look(self, x, y, theta):
+        """See how near things are, and from which speed the robot can still brake in time."""
+        if self.guidance.obstacles:
+            braking = self.limits.acceleration, self.period
+            self.edge, self.most = self.guidance.obstacles.edge_and_limit(x, y, theta, *braking)
 
 
 class Plain(Supervisor):
@@ -615,7 +601,8 @@ class Plain(Supervisor):
         error = wrapped(atan2(uy, ux) - theta)
         shown = min(float(self.shown_speeds(self.active, [(x, y)])[0]), self.arriving(x, y))
         speed = 0.0 if abs(error) > self.rules.sharp else shown * self.pace * cos(error)
-        return self.safe(speed, x, y, theta), self.turning(error)
+        self.look(x, y, theta)
+        return min(speed, self.most), self.turning(error)
 
 
 class Pursuit(Supervisor):
@@ -671,15 +658,16 @@ class Pursuit(Supervisor):
             return 0.0, 0.0
         ahead = self.pursued(x, y)
         ux, uy = towards(*ahead, x, y)
-        if self.guidance.obstacles:
+        self.look(x, y, theta)
+        if self.edge <= self.tight:
             ux, uy = self.guidance.obstacles.outwards(x, y, ux, uy)
         error = wrapped(atan2(uy, ux) - theta)
         curvature = 2 * sin(error) / max(dist(ahead, (x, y)), STEP)
         speed = self.pace * min(self.planned[self.at], self.limits.turn / max(abs(curvature), 1e-9))
-        speed = self.safe(speed, x, y, theta)
+        speed = min(speed, self.most)
         self.expect_progress(self.end - self.at, 0)
-        tight = self.most < CREEPING and abs(error) > FACING
-        if abs(error) > self.rules.sharp or speed == 0.0 or tight:
+        off = abs(error)
+        if off > self.rules.sharp or speed == 0.0 or (self.most < CREEPING and off > FACING):
             return 0.0, self.turning(error)
         return speed, curvature * speed
 

@@ -19,7 +19,7 @@ from dollop.checks import (
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.robot.avoidance import PIONEER_AVOIDANCE, PIONEER_RADIUS, Avoidance, ObstacleMap
-from dollop.robot.control import CONTROL_LAWS, PIONEER_FOLLOWING, Following, Limits, clip
+from dollop.robot.control import CONTROL_LAWS, PIONEER_FOLLOWING, Following, Limits
 from dollop.robot.run import run_of
 from dollop.robot.ways import WayKeeper
 from dollop.sequenced_lds import SequencedLDS
@@ -146,7 +146,9 @@ class Controller:
         self.reason, self.over = "", False
         self._notes, self._rows, self._times = self._robot.notes, [], []
         self._late = self._blind = self._leaping = 0.0
-        self._last, self._place = (0.0, 0.0), None
+        limits, period = self._robot.limits, self._robot.period
+        self._most = *limits[:2], limits.acceleration * period, limits.turn_acceleration * period
+        self._last = 0.0, 0.0
         self._search, self._clearance = Search(self._robot.period), Clearance()
 
     def __repr__(self):
@@ -216,38 +218,30 @@ class Controller:
         if elapsed is not None and self._rows:
             self._late += checked_number("elapsed", elapsed, 0.0, LONGEST_RUN) - period
         elapsed, now = period if elapsed is None else float(elapsed), self.time
+        lost = pose is None
         x, y, theta = pose = _as_pose(pose)
         finite = isfinite(x + y + theta)
-        localised = self._robot.localised(pose)
+        localised = not lost and self._robot.localised
         touching = self._robot.touching
         if localised and finite:
             self._keeper.begin(x, y)
-        self._record(pose, localised, touching, now)
+        true_pose = self._robot.true_pose(pose)
+        self._rows.append((*pose, *true_pose, self.active, self.way, localised, touching))
+        self._times.append(now)
+        self._clearance.add(true_pose[0], true_pose[1], self.known)
         if localised and not finite:
             return self._stop(f"the pose must be finite, got {x, y, theta} at {now:.1f} s")
         if localised and self._keeper.refused:
             return self._stop(self._keeper.refused)
         if localised:
             self._blind = 0.0
-            self._notice_leaps(x, y, elapsed)
             wish, most = self._keeper.command(x, y, theta, elapsed, self._last[0] == 0.0)
+            leapt = self._keeper.supervisor.leapt
+            self._leaping = max(self._leaping + (elapsed if leapt else -elapsed), 0.0)
         else:
             self._blind += elapsed
             wish, most = self._search.command(touching), np.inf
         return self._given_up(x, y, now) or self._ramped(*wish, most)
-
-    def _record(self, pose, localised, touching, now):
-        """Keep what is the case in this step."""
-        true_pose = self._robot.true_pose(pose)
-        self._rows.append((*pose, *true_pose, self.active, self.way, localised, touching))
-        self._times.append(now)
-        self._clearance.add(*true_pose[:2], self.known)
-
-    def _notice_leaps(self, x, y, elapsed):
-        """Add up for how long the pose has leapt more often than not."""
-        leapt = self._place is not None and self._keeper.leapt(*self._place, x, y)
-        self._place = x, y
-        self._leaping = max(self._leaping + (elapsed if leapt else -elapsed), 0.0)
 
     def _given_up(self, x, y, now):
         """Stop where it is time to, and say why; None otherwise."""
@@ -269,11 +263,9 @@ class Controller:
 
     def _ramped(self, speed, turn, most):
         """What is wished for as far as the limits allow, no faster than is safe; over where it stands at the end."""
-        limits, period = self._robot.limits, self._robot.period
-        last_speed, last_turn = self._last
-        step, turn_step = limits.acceleration * period, limits.turn_acceleration * period
-        speed = last_speed + clip(clip(speed, limits.speed) - last_speed, step)
-        turn = last_turn + clip(clip(turn, limits.turn) - last_turn, turn_step)
+        (last_speed, last_turn), (fastest, sharpest, step, turn_step) = self._last, self._most
+        speed = max(-fastest, last_speed - step, min(speed, fastest, last_speed + step))
+        turn = max(-sharpest, last_turn - turn_step, min(turn, sharpest, last_turn + turn_step))
         self._last = min(speed, most), turn
         if self._keeper.done and self._last == (0.0, 0.0):
             self.over = True
@@ -354,31 +346,32 @@ class _Body:
         self.radius = checked_radius(getattr(robot, "radius", PIONEER_RADIUS))
         accuracy = getattr(robot, "accuracy", ACCURACY)
         self.accuracy = checked_number("the robot's accuracy", accuracy, 0.0, RADII[1])
-        self._known = not hasattr(robot, "localised")
-        if not self._known:
+        told = ("localised", "touching", "noticed", "true_pose")
+        self._doubts, self._feels, self._sees, self._measured = (hasattr(robot, name) for name in told)
+        if self._doubts:
             checked_flag("whether the robot is localised", robot.localised)
 
     def __repr__(self):
         return f"a robot of {self.radius:g} m radius"
 
-    def localised(self, pose):
-        """Whether the robot trusts a pose."""
-        return pose[0] == pose[0] if self._known else self._robot.localised
+    @property
+    def localised(self):
+        """Whether the robot trusts its pose."""
+        return self._robot.localised if self._doubts else True
 
     @property
     def touching(self):
         """Whether it touches something, None if it cannot feel."""
-        return getattr(self._robot, "touching", None)
+        return self._robot.touching if self._feels else None
 
     @property
     def noticed(self):
         """All that it has noticed so far."""
-        return getattr(self._robot, "noticed", None)
+        return self._robot.noticed if self._sees else None
 
     def true_pose(self, pose):
         """Where it is, if it tells; else what it believes."""
-        true_pose = getattr(self._robot, "true_pose", None)
-        return pose if true_pose is None else true_pose
+        return self._robot.true_pose if self._measured else pose
 
 
 def checked_radius(radius):
@@ -462,7 +455,7 @@ def ways_of(task, only=False):
 
 def named_subgoals(law):
     """The subgoals of a law, each with its name."""
-    return [(f"subgoal {k}", place) for k, place in enumerate(law.subgoals)]
+    return [(f"subgoal {k}", place) for k, place in enumerate(law.subgoals, 1)]
 
 
 def check_some_way(ways, obstacles, enough):

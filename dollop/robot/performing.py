@@ -10,6 +10,7 @@ Environment of all that it has noticed so far; a simulated one has `true_pose`, 
 """
 
 from contextlib import suppress
+from math import isfinite
 
 from dollop.checks import (
     check_has,
@@ -24,7 +25,7 @@ from dollop.checks import (
 )
 from dollop.pose import moved_pose
 from dollop.robot.avoidance import PIONEER_AVOIDANCE, PIONEER_RADIUS
-from dollop.robot.control import PIONEER_FOLLOWING, PIONEER_LIMITS, Limits, clip
+from dollop.robot.control import PIONEER_FOLLOWING, PIONEER_LIMITS, Limits
 from dollop.robot.controller import PERIODS, Controller, checked_radius
 
 __all__ = ["Unicycle", "perform"]
@@ -100,17 +101,14 @@ class Unicycle:
         ValueError
             For what are no numbers.
         """
-        speed, turn = checked_number("speed", speed), checked_number("turn", turn)
-        limits, period = self.limits, self.period
-        self.speed = approach(self.speed, clip(speed, limits.speed), limits.acceleration * period)
-        self.turn = approach(self.turn, clip(turn, limits.turn), limits.turn_acceleration * period)
-        arc = self.speed * period, self.turn * period
+        if not (type(speed) is type(turn) is float and isfinite(speed + turn)):
+            speed, turn = checked_number("speed", speed), checked_number("turn", turn)
+        fastest, sharpest, acceleration, turn_acceleration = self.limits
+        step, turn_step = acceleration * self.period, turn_acceleration * self.period
+        self.speed = max(-fastest, self.speed - step, min(speed, fastest, self.speed + step))
+        self.turn = max(-sharpest, self.turn - turn_step, min(turn, sharpest, self.turn + turn_step))
+        arc = self.speed * self.period, self.turn * self.period
         self.pose = tuple(moved_pose(self.pose, *arc).tolist())
-
-
-def approach(value, goal, step):
-    """The value moved towards the goal by at most `step`."""
-    return value + clip(goal - value, step)
 
 
 def perform(

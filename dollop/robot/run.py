@@ -253,7 +253,7 @@ def _cut_short(waits, period):
     """Why the waits (W, 3) were not those that were shown; empty if they were."""
     for place, shown, stood in waits:
         if stood < shown - period:
-            where = f"subgoal {place - 1:.0f}" if place else "the start"
+            where = f"subgoal {place:.0f}" if place else "the start"
             return f"it stood {stood:.1f} s at {where} where {shown:.1f} s were shown"
     return ""
 
@@ -295,7 +295,8 @@ class Driven:
             begun = sum(line.way[-1] for line in lines[w][:k])
             along[rows], apart[rows] = _beside(places[rows], lines[w][k])
             along[rows] += begun
-            if k:  # it may have handed over before its subgoal
+            rows = rows[apart[rows] > STEP]
+            if k and len(rows):  # it may have handed over before its subgoal
                 apart[rows] = np.minimum(apart[rows], _beside(places[rows], lines[w][k - 1])[1])
         steps = np.hypot(*np.diff(places, axis=0).T)
         return cls(
@@ -345,7 +346,7 @@ class Driven:
         first = self.active[since[-1] + 1] if len(since) else 0
         for k in range(first, len(reached)):
             if not reached[k]:
-                return f"subgoal {k} was not reached: {least[k]:.2f} m at the nearest"
+                return f"subgoal {k + 1} was not reached: {least[k]:.2f} m at the nearest"
         return ""
 
     def notes(self, t):
@@ -369,16 +370,25 @@ class Driven:
 
 
 def _beside(places, line):
-    """Way in m to the nearest place of a line, for places (N, 2) in m, and the distances (N,) from it."""
-    tails, steps = line.places[:-1], np.diff(line.places, axis=0)
-    squares = np.maximum((steps**2).sum(axis=1), 1e-18)
+    """Way in m to the nearest place of a line, for places (N, 2) in m, and the distances (N,) from it.
+
+    On the edges that meet in the nearest of its own places: these lie closely.
+    """
+    (x, y), last = line.places.T, len(line.places) - 1
     along, apart = [], []
-    for part in np.array_split(places, 1 + len(places) * len(tails) // AT_ONCE):
-        offset = part[:, None] - tails
-        share = np.clip((offset * steps).sum(axis=2) / squares, 0, 1)
-        away = ((offset - share[..., None] * steps) ** 2).sum(axis=2)
-        nearest = away.argmin(axis=1)
-        rows = np.arange(len(part))
-        along.append(line.way[nearest] + share[rows, nearest] * np.diff(line.way)[nearest])
-        apart.append(np.sqrt(away[rows, nearest]))
+    for part in np.array_split(places, 1 + len(places) * len(x) // AT_ONCE):
+        nearest = ((part[:, :1] - x) ** 2 + (part[:, 1:] - y) ** 2).argmin(axis=1)
+        sides = [_on_edge(part, line, np.clip(nearest + side, 0, last - 1)) for side in (-1, 0)]
+        closer = sides[1][1] < sides[0][1]
+        along.append(np.where(closer, sides[1][0], sides[0][0]))
+        apart.append(np.where(closer, sides[1][1], sides[0][1]))
     return np.concatenate(along), np.concatenate(apart)
+
+
+def _on_edge(places, line, at):
+    """Way in m to the place nearest to each of some (N, 2) in m on an edge each (N,), and the distances (N,)."""
+    tails, steps = line.places[at], line.places[at + 1] - line.places[at]
+    offsets = places - tails
+    share = np.clip((offsets * steps).sum(axis=1) / np.maximum((steps**2).sum(axis=1), 1e-18), 0, 1)
+    away = offsets - share[:, None] * steps
+    return line.way[at] + share * (line.way[at + 1] - line.way[at]), np.hypot(*away.T)

@@ -17,7 +17,7 @@ along than the robot has come.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, cos, hypot, inf, isfinite, sin
+from math import ceil, cos, inf, isfinite, sin
 
 import numpy as np
 
@@ -314,7 +314,7 @@ class WayKeeper:
         str
         """
         closed = self.closed(self.ways[self.way], self.active, x, y)
-        told = closed or f"no progress towards subgoal {self.active}"
+        told = closed or f"no progress towards subgoal {self.active + 1}"
         if len(self.ways) == 1:
             return told
         others = (self._tell(way.index) for way in self.ways if way.index != self.way)
@@ -338,20 +338,6 @@ class WayKeeper:
         if self.obstacles is None:
             return np.full(len(goals), self.rules.reach)
         return np.array([max(self.rules.reach, self.obstacles.nearest_room(*goal) + AT_END) for goal in goals])
-
-    def leapt(self, x, y, now_x, now_y):
-        """Whether no robot drives from one place to another in one period.
-
-        Parameters
-        ----------
-        x, y, now_x, now_y : float
-            Both places in m.
-
-        Returns
-        -------
-        bool
-        """
-        return hypot(now_x - x, now_y - y) > self.supervisor.jump
 
     def waits(self):
         """How the robot has waited.
@@ -401,7 +387,7 @@ class WayKeeper:
         for k, goal in enumerate(way.law.subgoals.tolist()[segment:], segment):
             told = self.obstacles.no_way((x, y), goal, self.rules.reach)
             if told:
-                return told.format(f"subgoal {k}")
+                return told.format(f"subgoal {k + 1}")
         return ""
 
     def look_closer(self):

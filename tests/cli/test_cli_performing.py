@@ -198,3 +198,25 @@ def test_an_unknown_target_lists_the_known_ones(room, capsys):
     assert said.status == 1 and all(each in said.err for each in ("nav2", "waypoints", "csv", "moveit"))
     said = call(capsys, "export", "task.json", "--to", "nav2", "--out", "route.txt")
     assert said.status == 1 and ".geojson" in said.err and not Path("route.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("suffix", "change"),
+    [
+        (".geojson", ('"metadata"', '"data"')),
+        (".geojson", ('"Point", "coordinates": [', '"Point", "coordinates": ["x", ')),
+        (".yaml", ("wait:", "weight:")),
+        (".yaml", ("waypoints:", "waypoints: &all")),
+        (".csv", ("wait", "weight")),
+        (".csv", (".", "x")),
+    ],
+)
+def test_a_damaged_route_is_refused_in_one_line(suffix, change, room, capsys):
+    """What is no route as it is written here says what is the matter; no picture is written."""
+    to = {".geojson": "nav2", ".yaml": "waypoints", ".csv": "csv"}[suffix]
+    call(capsys, "export", "task.json", "--to", to, "--out", f"route{suffix}")
+    head, *rest = Path(f"route{suffix}").read_text().split("\n", 1)
+    Path(f"route{suffix}").write_text("\n".join([head, *(each.replace(*change) for each in rest)]))
+    said = call(capsys, "show", f"route{suffix}", "--out", "shown.png")
+    assert said.status == 1 and said.err.startswith(f"dollop: route{suffix}") and said.err.count("\n") == 1
+    assert not Path("shown.png").exists()

@@ -4,8 +4,9 @@ import json
 
 import numpy as np
 import pytest
+from rooms import CANS, room_map, walk, watched
 
-from dollop import Demonstration, Environment, FormatError, Matching, SequencedLDS, Task, learn
+from dollop import Demonstration, Environment, FormatError, Matching, SequencedLDS, Task, learn, observe
 from dollop.lab.tasks import way_through
 from dollop.learning.saving import as_dict
 from dollop.trajectory import arc_length
@@ -173,6 +174,16 @@ def test_a_file_of_a_way_with_its_pauses_in_the_walk_still_loads(tmp_path):
     way["walks"], way["shares"] = [walk.tolist()], [np.linspace(0, 79, len(walk)).tolist()]
     (tmp_path / "old.json").write_text(json.dumps(content))
     assert waits(Task.load(tmp_path / "old.json").law)[1] == pytest.approx([4.0], abs=0.3)
+
+
+def test_who_stands_before_a_laser_is_no_object_and_waits():
+    """Watched by a laser for 8 s at one place: a task that waits there, to a second and 10 cm, among the cans alone."""
+    there, on = walk([7.0, 2.5], [4.5, 3.5]), walk([4.5, 3.5], [2.0, 2.0])
+    way = np.concatenate([there, np.repeat(there[-1:], 80, axis=0), on])
+    shown = Demonstration.of(observe(watched(way, CANS), room_map()))
+    places, seconds = waits(learn([shown]).law)
+    assert seconds == pytest.approx([8.0], abs=1.0) and np.hypot(*(places[0] - [4.5, 3.5])) < 0.1
+    assert len(shown.environment) == len(CANS) and shown.notes == ()
 
 
 @pytest.mark.parametrize(

@@ -207,7 +207,7 @@ def test_a_stuck_robot_gives_up(task, background):
     """A robot that does not move gives up and says at which subgoal."""
     for control in ("plain", "pursuit"):
         run = perform(task, Stuck(START), control, background=background)
-        assert not run.finished and "no progress towards subgoal 0" in run.reason
+        assert not run.finished and "no progress towards subgoal 1" in run.reason
         assert run.t[-1] < 120
 
 
@@ -218,7 +218,7 @@ def test_a_walled_subgoal_is_given_up(task, background):
         there = SimpleNamespace(law=task.law, environment=wall)
         run = perform(there, Unicycle(START), control, background=background)
         assert not run.finished and run.collisions == 0 and len(run.t) == 1
-        assert run.reason.startswith("there is no way to subgoal 0 for a robot of 0.25 m radius") and run.done < 0.3
+        assert run.reason.startswith("there is no way to subgoal 1 for a robot of 0.25 m radius") and run.done < 0.3
 
 
 def test_time_is_limited(task):
@@ -365,9 +365,9 @@ def test_bad_input(task, background, change, message):
 @pytest.mark.parametrize(
     ("place", "message"),
     [
-        ((7.5, 0.3), "subgoal 1 must be free"),
-        ((2.5, 3.6), "subgoal 1 must be free"),
-        ((12.0, 3.0), "subgoal 1 must lie"),
+        ((7.5, 0.3), "subgoal 2 must be free"),
+        ((2.5, 3.6), "subgoal 2 must be free"),
+        ((12.0, 3.0), "subgoal 2 must lie"),
     ],
 )
 def test_subgoals_must_be_free(task, background, place, message):

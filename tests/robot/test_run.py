@@ -131,7 +131,7 @@ class Dreaming(Unicycle):
 def test_a_robot_that_believes_to_have_done_it_has_not():
     """Where it truly was decides."""
     run = perform(task(), Dreaming((0.0, 0.0, 0.0)))
-    assert not run.finished and run.reason.startswith("subgoal 1 was not reached: ")
+    assert not run.finished and run.reason.startswith("subgoal 2 was not reached: ")
     assert run.reached.tolist() == [True, False]
 
 

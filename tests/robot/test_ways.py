@@ -261,7 +261,7 @@ def test_where_no_way_leads_through_it_gives_up_and_names_all(found):
     bare = SimpleNamespace(law=BETWEEN, ways=(BETWEEN, ROUND), shown=(3, 1), environment=Environment([]))
     run = perform(bare, Noticing(START, *found), background=background)
     assert not run.finished and run.collisions == 0
-    assert run.reason.startswith("there is no way to subgoal 0 for a robot of 0.25 m radius that keeps 0.02 m: none")
+    assert run.reason.startswith("there is no way to subgoal 1 for a robot of 0.25 m radius that keeps 0.02 m: none")
     assert ", on way 0 (way 1 is closed) at " in run.reason if found else run.reason.endswith("(1 more are closed)")
 
 
@@ -326,7 +326,7 @@ def test_a_run_of_old_is_on_the_usual_way():
     [
         ({"ways": ()}, "must have a way, .* got 0 ways"),
         ({"shown": (3,)}, r"shown must count each, got 2 ways and \[3\]"),
-        ({"environment": Environment([[5.7, -0.3, 6.3, 0.3]])}, "subgoal 0 must be free"),
+        ({"environment": Environment([[5.7, -0.3, 6.3, 0.3]])}, "subgoal 1 must be free"),
     ],
 )
 def test_bad_ways(change, message):
