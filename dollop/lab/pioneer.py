@@ -129,7 +129,7 @@ class Pioneer:
     @property
     def accuracy(self):
         """How far its pose may be off, in m: what localisation is accurate to, in a room of the lab."""
-        return 0.0 if self.localizer is None else 0.05
+        return 0.0 if self.localizer is None else 0.02
 
     @property
     def touching(self):

@@ -16,7 +16,7 @@ of this is Dollop's own.
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, hypot, inf, sin, sqrt
+from math import ceil, cos, hypot, inf, sin, sqrt
 
 import numpy as np
 import scipy
@@ -694,8 +694,10 @@ class Geodesic:
         --------
         >>> from dollop.environment import Environment
         >>> obstacles = ObstacleMap.of(Environment([]), places=[[0, 0], [1, 0]])
-        >>> Geodesic(obstacles, (1.0, 0.0)).path(0.0, 0.0, 0.5).round(1).tolist()
-        [[0.5, 0.0], [1.0, 0.0]]
+        >>> geodesic = Geodesic(obstacles, (1.0, 0.0))
+        >>> path = geodesic.path(0.0, 0.0, 0.25)
+        >>> len(path), bool(np.allclose(path[-1], geodesic.goal))
+        (5, True)
         """
         cell = self.obstacles._cell(x, y)
         if self._distances[cell] == inf:
@@ -714,7 +716,7 @@ class Geodesic:
         room = np.minimum(self.obstacles.edges(raw) - DIPS, self.obstacles.rules.kept)
         even = np.where((self.obstacles.edges(even) < room)[:, None], raw, even)
         way = arc_length(even)
-        at = np.append(np.arange(step, way[-1], step), way[-1])
+        at = np.append(step * np.arange(1, ceil(way[-1] / step - 1e-6)), way[-1])
         return at_arc_length(even, at)
 
 

@@ -321,6 +321,9 @@ class Guidance:
         if self._relative is None:
             return np.ones(len(places))
         line, along = self.lines[k], self._relative[k]
+        if len(places) == 1:
+            share = line.way[line.nearest(places[0])] / max(line.way[-1], STEP)
+            return along[[min(int(share * len(along)), len(along) - 1)]]
         parts = np.array_split(places, 1 + len(places) * len(line.places) // AT_ONCE)
         squared = (((part[:, None] - line.places) ** 2).sum(axis=2) for part in parts)
         nearest = np.concatenate([each.argmin(axis=1) for each in squared])

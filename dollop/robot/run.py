@@ -233,7 +233,7 @@ def run_of(rows, t, clearance, keeper, robot, reason, kidnapped, notes):
     apart = driven.to_subgoals()
     reached = apart <= keeper.needs() + slack
     reason = reason or driven.missed(reached, apart) or _cut_short(waits, robot.period)
-    notes = (*notes, *_unknown(table, starts, clearance), *driven.notes(t))
+    notes = (*notes, *_unknown(table, starts, clearance), *_lost(table[:, 8] > 0, t), *driven.notes(t, kidnapped))
     return Run(
         t, poses, true_poses, active, table[:, 8] > 0, clearance, not reason, reason, len(starts), kidnapped, way,
         robot.radius, driven.done(keeper.done), reached, driven.farthest(keeper.rules.reach), waits, notes,
@@ -247,6 +247,15 @@ def _unknown(table, starts, clearance):
         x, y = table[there[0], 3:5]
         text = f"it touched something at ({x:.2f}, {y:.2f}), where its map has {clearance[there[0]]:.2f} m of room"
         yield Note("unknown", text)
+
+
+def _lost(localised, t):
+    """A note of how long the robot did not know where it was, if it did not."""
+    lost = np.flatnonzero(~localised)
+    if len(lost):
+        seconds = np.diff(t, append=t[-1])[lost].sum()
+        told = f"it did not know where it was for {seconds:.1f} s, first at {t[lost[0]]:.1f} s"
+        yield Note("lost", told, doubt=False)
 
 
 def _cut_short(waits, period):
@@ -349,8 +358,16 @@ class Driven:
                 return f"subgoal {k + 1} was not reached: {least[k]:.2f} m at the nearest"
         return ""
 
-    def notes(self, t):
-        """Where the robot changed ways, and what it did not drive because it was put farther along."""
+    def notes(self, t, kidnapped):
+        """Where the robot changed ways or leapt, and what it did not drive because it was put farther along."""
+        steps = np.append(0.0, np.hypot(*np.diff(self.places, axis=0).T))
+        told = (np.abs(np.subtract.outer(t, kidnapped)) <= 1.5 * np.diff(t[:2]).sum()).any(axis=1)
+        leaps = np.flatnonzero(self.leaps & (steps > 0) & ~told)
+        if len(leaps):
+            first = f"by {steps[leaps[0]]:.2f} m at {t[leaps[0]]:.1f} s"
+            rule = "carried off, or localised anew"
+            times = f", and {len(leaps) - 1} times more" if len(leaps) > 1 else ""
+            yield Note("leap", f"its pose leapt {first}{times}: {rule}", doubt=False)
         for i in np.flatnonzero(np.diff(self.way)) + 1:
             x, y = self.places[i]
             yield Note(

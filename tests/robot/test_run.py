@@ -152,3 +152,27 @@ def test_slow_brakes_end_at_the_last_subgoal():
     law = replace(CORNER, speeds=np.array([0.9, 0.9]))
     run = perform(SimpleNamespace(law=law, environment=Environment([])), Unicycle((0.0, 0.0, 0.0), limits))
     assert run.finished and np.hypot(*(run.poses[-1, :2] - law.subgoals[-1])) < 0.1
+
+
+class Corrected(Unicycle):
+    """Does not know where it is for a second, and then finds itself half a metre farther on."""
+
+    periods = 0
+
+    def drive(self, speed, turn):
+        self.periods += 1
+        super().drive(speed, turn)
+        if self.periods == 40:
+            x, y, theta = self.pose
+            self.pose = x, y + 0.6, theta
+
+    @property
+    def localised(self):
+        return not 30 <= self.periods < 40
+
+
+def test_being_lost_and_leaping_is_told():
+    """It is good to know, and no doubt."""
+    run = perform(task(), Corrected((0.0, 0.0, 0.0)))
+    assert run.finished and run.trusted and [note.kind for note in run.notes] == ["lost", "leap"]
+    assert "for 1.0 s, first at 3.0 s" in run.notes[0].text and "leapt by 0.6" in run.notes[1].text
