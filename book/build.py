@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SOURCE, OUT = ROOT / "build" / "book-source", ROOT / "build" / "book"
 PAGES = (
     *("README.md", "REPLICATION.md", "CHANGELOG.md", "CONTRIBUTING.md"),
-    *("figures/README.md", "data/README.md"),
+    *("figures/README.md", "data/README.md", "book/own_log.md"),
 )
 PUBLIC = [name for name in dollop.__all__ if name != "__version__"]
 FILE_LINK = re.compile(r'(?:\]\(|src="|href=")([\w./-]+)(?=[)"#])')
