@@ -22,8 +22,7 @@ II                occluded; disappeared after 5 seconds         `Tracker.disappe
 II                user: the fastest foreground object           `tracking.identify_user`
 II                people, each as far as it is surely the same  `people`
 II                what stands, and since when                   `foreground.StandingCells`
-II                people, user, environment of a log            `observe`
-II                the same, scan by scan                        `Observer`
+II                people, user, environment of a log            `observe`, `Observer`
                   what may be wrong with a result, and why      `Note`
 III   p_n         position on a trajectory                      `trajectory`
 III               laps: walks along one trajectory              `laps`
@@ -37,9 +36,7 @@ III   u           its direction in the segment in force         `robot.control.G
 III   v, omega    speed and turning rate that it asks for       `robot.control.CONTROL_LAWS`
 III               performing a task; kidnapping the robot       `perform`
 III               the same, pose by pose, in another's loop     `Controller`
-III               whether it was the task                       `Run.verdict`
-                  how long the user stood at start and subgoals `SequencedLDS.pauses`
-                  whereto the law leaves and comes to them      `SequencedLDS.headings`
+                  the user's pauses, and the directions there   `SequencedLDS.pauses`
                   the task as a route for other software        `export`, `Route`
 IV    Omega^i     environment configuration i: 4N corners       `Environment.corners`
 IV-A  omega_m^i   corner m of Omega^i                           row m of it
