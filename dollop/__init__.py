@@ -35,11 +35,8 @@ III               response of the control law from a start      `SequencedLDS.re
 III               supervisory control law: segments hand over   `robot.control`
 III   u           its direction in the segment in force         `robot.control.Guidance`
 III   v, omega    speed and turning rate that it asks for       `robot.control.CONTROL_LAWS`
-III               performing a task; kidnapping the robot       `perform`
-III               the same, pose by pose, in another's loop     `Controller`
-III               whether it was the task                       `Run.verdict`
-                  how long the user stood at start and subgoals `SequencedLDS.pauses`
-                  whereto the law leaves and comes to them      `SequencedLDS.headings`
+III               performing a task; the same, pose by pose      `perform`, `Controller`
+III               `pauses` and headings at start and subgoals   `SequencedLDS.headings`
                   the task as a route for other software        `export`, `Route`
 IV    Omega^i     environment configuration i: 4N corners       `Environment.corners`
 IV-A  omega_m^i   corner m of Omega^i                           row m of it
