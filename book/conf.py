@@ -6,10 +6,13 @@ module dollop.laps for the function.)
 """
 
 import re
+import sys
 from importlib.util import find_spec
+from pydoc import locate
 
 from docutils.nodes import SkipNode
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.addnodes import pending_xref
 from sphinx.util.logging import getLogger
 from sphinx.util.nodes import make_refnode
 
@@ -25,6 +28,7 @@ extensions = [
     "sphinx_copybutton",
 ]
 myst_enable_extensions = ["dollarmath", "html_image"]
+myst_heading_anchors = 3  # as GitHub has them
 nb_execution_mode = "off"  # book/build.py has executed them
 nb_output_stderr = "remove"
 nb_ipywidgets_js = {}  # stills stand in for widgets, so nothing has to come from a network
@@ -93,6 +97,29 @@ def told_elsewhere(app, what, name, thing, skip, options):
     return True if thing.__module__ != app.env.current_document.autodoc_module else None
 
 
+def by_what_the_module_sees(app, doctree):
+    """Give a name its full one where its module, or one beside it, has it: two wings may have a `Way` each."""
+    for node in doctree.findall(pending_xref):
+        module, target = node.get("py:module"), node.get("reftarget", "")
+        if node.get("refdomain") == "py" and module and target.replace(".", "").isidentifier():
+            node["reftarget"] = full_name(target, module) or target
+
+
+def full_name(target, module):
+    """Where a public name that a module uses is defined; None if that is not plain."""
+    if "." in target:
+        things = [locate(target)] if target.startswith("dollop.") else []
+    else:
+        beside = [name for name in sorted(sys.modules) if name.rpartition(".")[0] == module.rpartition(".")[0]]
+        things = [getattr(sys.modules[name], target, None) for name in (module, *beside) if name in sys.modules]
+    for thing in things:
+        home = getattr(thing, "__module__", None)
+        name = getattr(thing, "__qualname__", "")
+        if callable(thing) and name in getattr(sys.modules.get(home), "__all__", ()):
+            return f"{home}.{name}"
+    return None
+
+
 def by_short_name(app, env, node, contnode):
     """Link a short name (`observe`, `LDS.fit`) to its entry, if only one object is called so.
 
@@ -125,4 +152,5 @@ def setup(app):
     for prepare in (plain_text_first, formulas_as_they_stand):
         app.connect("autodoc-process-docstring", prepare, priority=400)  # before napoleon
     app.connect("autodoc-skip-member", told_elsewhere)
+    app.connect("doctree-read", by_what_the_module_sees)
     app.connect("missing-reference", by_short_name)

@@ -394,8 +394,8 @@ def standing_boxes(places, sensors, step, scan=None, min_area=0.01):
         Mean reading in each cell, and where it was seen from, in m.
     step : float
         Angle between beams in rad.
-    scan : (pose (3,), angles (B,), ranges (B,)), optional
-        The last one, which tells what hides what.
+    scan : tuple, optional
+        Pose (3,), angles (B,) and ranges (B,) of the last one, which tells what hides what.
     min_area : float
         Smallest box in m^2 (Sec. II: 100 square centimetres).
 

@@ -1,7 +1,7 @@
 """The ways in which a task was shown, each from demonstrations among objects that stood elsewhere (Sec. V and beyond).
 
 Walks of one way are laid onto the places of one of them, what the places follow is told from all
-(`dollop.learning. places`), and the walks are laid onto the places again, by turns. Where a walk
+(`dollop.learning.places`), and the walks are laid onto the places again, by turns. Where a walk
 then misses the way for a while by more than walks do, it is no walk of this way: the demonstrations
 are divided by the two that are least alike, and each part is learned by itself. A walk that lacks
 the beginning or the end of the way adds to what it covers.
