@@ -32,7 +32,7 @@ III   g           subgoal: where a segment ends                 `LDS.goal`
 III   G0, G1      statistics of a segment; they add up          `lds.Statistics`
 III               response of the control law from a start      `SequencedLDS.response`
 III               supervisory control law: segments hand over   `robot.control`
-III   u           its direction in the segment in force         `robot.control.Guidance`
+III   u           its direction in the segment in force         `robot.guidance.Guidance`
 III   v, omega    speed and turning rate that it asks for       `robot.control.CONTROL_LAWS`
 III               performing a task; kidnapping the robot       `perform`
 III               the same, pose by pose, in another's loop     `Controller`

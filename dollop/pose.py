@@ -3,11 +3,11 @@
 Plane geometry as in S. Thrun, W. Burgard, D. Fox, "Probabilistic Robotics" (2005), ch. 5.
 """
 
-from math import cos, nextafter, pi, sin
+from math import cos, hypot, nextafter, pi, sin
 
 import numpy as np
 
-__all__ = ["between", "composed", "motion_between", "moved_pose", "poses_at", "rotation", "wrapped"]
+__all__ = ["between", "composed", "motion_between", "moved_pose", "poses_at", "rotation", "towards", "wrapped"]
 
 _LEAST = nextafter(-pi, 0)  # the least angle above -pi
 
@@ -190,3 +190,26 @@ def poses_at(t, times, poses):
     found = np.stack([np.interp(t, times, column) for column in columns], axis=-1)
     found[:, 2] = wrapped(found[:, 2])
     return found
+
+
+def towards(x, y, from_x=0.0, from_y=0.0):
+    """Unit vector that points to a place from another.
+
+    Parameters
+    ----------
+    x, y, from_x, from_y : float
+        Both places in m.
+
+    Returns
+    -------
+    (float, float)
+        Zero where they are the same.
+
+    Examples
+    --------
+    >>> towards(4.0, 6.0, 1.0, 2.0), towards(0.0, 0.0)
+    ((0.6, 0.8), (0.0, 0.0))
+    """
+    x, y = x - from_x, y - from_y
+    size = hypot(x, y)
+    return (x / size, y / size) if size > 1e-12 else (0.0, 0.0)

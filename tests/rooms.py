@@ -7,7 +7,7 @@ import numpy as np
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.laser import LaserLog
-from dollop.robot.avoidance import Geodesic
+from dollop.robot.geodesic import Geodesic
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import arc_length, at_arc_length
 

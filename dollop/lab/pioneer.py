@@ -6,7 +6,7 @@ import numpy as np
 
 from dollop.lab.engine import STEPS_PER_SECOND
 from dollop.pose import motion_between, moved_pose
-from dollop.robot.control import PIONEER_LIMITS, Limits
+from dollop.robot.guidance import PIONEER_LIMITS, Limits
 from dollop.robot.localization import PIONEER_LOCALISATION, MonteCarloLocalizer
 
 __all__ = ["Pioneer", "put_pioneer"]

@@ -17,7 +17,7 @@ from dollop.lab.scenes import empty_scene, figure_eight_scene
 from dollop.lab.world import World
 from dollop.laser import LaserLog
 from dollop.pose import moved_pose, wrapped
-from dollop.robot.control import PIONEER_LIMITS
+from dollop.robot.guidance import PIONEER_LIMITS
 
 __all__ = ["record", "record_background", "record_figure_eights", "record_tour", "watch"]
 

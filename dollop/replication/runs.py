@@ -5,7 +5,7 @@ from math import isfinite
 
 import numpy as np
 
-from dollop.robot.avoidance import Geodesic
+from dollop.robot.geodesic import Geodesic
 from dollop.trajectory import distance_to_polyline
 
 __all__ = ["distances_to_law", "free_poses", "return_times"]

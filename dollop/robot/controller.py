@@ -19,7 +19,8 @@ from dollop.checks import (
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.robot.avoidance import PIONEER_AVOIDANCE, PIONEER_RADIUS, Avoidance, ObstacleMap
-from dollop.robot.control import CONTROL_LAWS, PIONEER_FOLLOWING, Following, Limits
+from dollop.robot.control import CONTROL_LAWS
+from dollop.robot.guidance import PIONEER_FOLLOWING, Following, Limits
 from dollop.robot.run import run_of
 from dollop.robot.ways import WayKeeper
 from dollop.sequenced_lds import SequencedLDS

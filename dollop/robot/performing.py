@@ -25,8 +25,8 @@ from dollop.checks import (
 )
 from dollop.pose import moved_pose
 from dollop.robot.avoidance import PIONEER_AVOIDANCE, PIONEER_RADIUS
-from dollop.robot.control import PIONEER_FOLLOWING, PIONEER_LIMITS, Limits
 from dollop.robot.controller import PERIODS, Controller, checked_radius
+from dollop.robot.guidance import PIONEER_FOLLOWING, PIONEER_LIMITS, Limits
 
 __all__ = ["Unicycle", "perform"]
 

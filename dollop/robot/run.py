@@ -20,7 +20,7 @@ from dollop.checks import (
     trusted,
 )
 from dollop.robot.avoidance import PIONEER_RADIUS
-from dollop.robot.control import STEP
+from dollop.robot.guidance import STEP
 
 __all__ = ["Run", "run_of"]
 

@@ -22,8 +22,9 @@ from math import ceil, cos, inf, isfinite, sin
 import numpy as np
 
 from dollop.checks import Note
-from dollop.robot.avoidance import Geodesic
-from dollop.robot.control import AT_END, CONTROL_LAWS, PIONEER_FOLLOWING, STEP, Guidance
+from dollop.robot.control import CONTROL_LAWS
+from dollop.robot.geodesic import Geodesic
+from dollop.robot.guidance import AT_END, PIONEER_FOLLOWING, STEP, Guidance
 from dollop.trajectory import distance_to_polyline
 
 __all__ = ["Way", "WayKeeper", "counterpart", "extra_length", "fitting"]

@@ -18,7 +18,7 @@ from dollop.lab.scenes import empty_scene, figure_eight_scene
 from dollop.lab.things import BEAM_HEIGHT
 from dollop.lab.world import World
 from dollop.pose import moved_pose
-from dollop.robot.control import PIONEER_LIMITS
+from dollop.robot.guidance import PIONEER_LIMITS
 from dollop.robot.performing import perform
 from dollop.sequenced_lds import SequencedLDS
 

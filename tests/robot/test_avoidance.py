@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.robot import avoidance
-from dollop.robot.avoidance import FREEING, PIONEER_AVOIDANCE, Geodesic, ObstacleMap
+from dollop.robot.avoidance import FREEING, PIONEER_AVOIDANCE, ObstacleMap
+from dollop.robot.geodesic import Geodesic
 
 BOX = ObstacleMap.of(Environment([[-0.5, -0.5, 0.5, 0.5]]))
 angles = st.floats(-np.pi, np.pi)

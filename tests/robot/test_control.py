@@ -13,15 +13,8 @@ from dollop.gridmap import OccupancyGrid
 from dollop.lds import LDS, Statistics
 from dollop.pose import wrapped
 from dollop.robot.avoidance import ObstacleMap
-from dollop.robot.control import (
-    CONTROL_LAWS,
-    PIONEER_FOLLOWING,
-    PIONEER_LIMITS,
-    STEP,
-    Guidance,
-    Limits,
-    bend_speeds,
-)
+from dollop.robot.control import CONTROL_LAWS, bend_speeds
+from dollop.robot.guidance import PIONEER_FOLLOWING, PIONEER_LIMITS, STEP, Guidance, Limits
 from dollop.robot.performing import Unicycle
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import distance_to_polyline

@@ -15,8 +15,8 @@ from dollop.environment import Environment
 from dollop.gridmap import OccupancyGrid
 from dollop.robot import avoidance, controller
 from dollop.robot.avoidance import PIONEER_AVOIDANCE, ObstacleMap
-from dollop.robot.control import PIONEER_LIMITS, Limits
 from dollop.robot.controller import Search
+from dollop.robot.guidance import PIONEER_LIMITS, Limits
 from dollop.robot.performing import Unicycle, perform
 from dollop.trajectory import distance_to_polyline
 

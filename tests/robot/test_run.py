@@ -183,3 +183,12 @@ def test_a_way_that_is_closed_and_gone_round_puts_the_run_in_doubt():
     run = perform(task([1.0, -2.0, 1.3, 2.0]), Unicycle((0.0, 0.0, 0.0)))
     assert run.finished and run.farthest > 1.5 and not run.trusted
     assert [note.kind for note in run.notes] == ["aside"]
+
+
+@pytest.mark.parametrize("control", ["plain", "pursuit"])
+@pytest.mark.parametrize("before", [0.05, 0.15, 0.25, 0.45])
+def test_carried_off_at_the_very_end_it_comes_back(control, before):
+    """It has done the task when it stands at the end, not when the last segment hands over."""
+    end = perform(task(), Unicycle((0.0, 0.0, 0.0)), control).t[-1]
+    run = perform(task(), Unicycle((0.0, 0.0, 0.0)), control, kidnap=[(end - before, (0.5, 2.0, 1.0))])
+    assert run.finished and np.hypot(*(run.poses[-1, :2] - CORNER.subgoals[-1])) < 0.3

@@ -17,7 +17,7 @@ from dollop.replication.claims.claim import MOSTLY, NONE, Criterion, claim
 from dollop.replication.claims.measures import SHARES, headings, plain_run, segments_along, windings
 from dollop.replication.runs import distances_to_law, free_poses, return_times
 from dollop.robot.avoidance import ObstacleMap
-from dollop.robot.control import Guidance
+from dollop.robot.guidance import Guidance
 from dollop.trajectory import resample
 
 __all__ = []
