@@ -22,8 +22,7 @@ II                occluded; disappeared after 5 seconds         `Tracker.disappe
 II                user: the fastest foreground object           `tracking.identify_user`
 II                people, each as far as it is surely the same  `people`
 II                what stands, and since when                   `foreground.StandingCells`
-II                people, user, environment of a log            `observe`
-II                the same, scan by scan                        `Observer`
+II                people, user, environment of a log            `observe`, `Observer`
                   what may be wrong with a result, and why      `Note`
 III   p_n         position on a trajectory                      `trajectory`
 III               laps: walks along one trajectory              `laps`
@@ -35,8 +34,9 @@ III               response of the control law from a start      `SequencedLDS.re
 III               supervisory control law: segments hand over   `robot.control`
 III   u           its direction in the segment in force         `robot.control.Guidance`
 III   v, omega    speed and turning rate that it asks for       `robot.control.CONTROL_LAWS`
-III               performing a task; the same, pose by pose      `perform`, `Controller`
-III               `pauses` and headings at start and subgoals   `SequencedLDS.headings`
+III               performing a task; kidnapping the robot       `perform`
+III               the same, pose by pose, in another's loop     `Controller`
+                  the user's pauses, and the directions there   `SequencedLDS.pauses`
                   the task as a route for other software        `export`, `Route`
 IV    Omega^i     environment configuration i: 4N corners       `Environment.corners`
 IV-A  omega_m^i   corner m of Omega^i                           row m of it

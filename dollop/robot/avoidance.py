@@ -37,6 +37,8 @@ OPEN_BORDER = 3.0
 """Border in m of a world without a map round all that is in it, beside the robot's diameter."""
 CREEPING = 0.05
 """Speed in m/s of a robot that has next to no room, or comes to a place where it is to stand."""
+FREEING = 0.01
+"""Speed in m/s of a robot that frees itself from what it touches."""
 MOST_CELLS, COARSEST = 3_000_000, 0.5
 """Cells of a map at most, of 300 bytes each where a shortest way is looked for; and their side in m
 at most."""
@@ -371,7 +373,8 @@ class ObstacleMap:
     def speed_limit(self, x, y, theta, deceleration, period):
         """Speed from which a robot still stops before it touches, wherever what is near may be.
 
-        Outwards or along it may always creep; with next to no room left, only so (reconstruction).
+        Outwards or along it may always creep, and brake within half the room that there is; with next
+        to no room left, only so; and in contact, hardly, and straight out (reconstruction).
 
         Parameters
         ----------
@@ -404,10 +407,13 @@ class ObstacleMap:
         """
         edge, nx, ny = self._edge_and_slope(x, y)
         left = min(self.rules.tight / 2, 0.02)
-        room, outwards = edge - left, nx * cos(theta) + ny * sin(theta)
-        speed = deceleration * (sqrt(period * period + 2 * max(room, 0.0) / deceleration) - period)
-        creeps = outwards > (0.05 if room < -left / 2 else -0.05)
-        return edge, max(speed, CREEPING) if creeps else speed
+        outwards = nx * cos(theta) + ny * sin(theta)
+        speed = braked_within(edge - left, deceleration, period)
+        if edge <= 0:
+            return edge, FREEING if outwards > 0.5 else 0.0
+        if outwards > (0.05 if edge < left / 2 else -0.05):
+            speed = max(speed, min(braked_within(edge / 2, deceleration, period), CREEPING))
+        return edge, speed
 
     def outwards(self, x, y, ux, uy):
         """A direction, led off what is near where there is next to no room (reconstruction).
@@ -746,6 +752,11 @@ def towards(x, y, from_x=0.0, from_y=0.0):
 def _regions(passable):
     """Which of cells (H, W) hang together, side by side or corner to corner: a number from 1 on, else 0."""
     return scipy.ndimage.label(passable, np.ones((3, 3)))[0]
+
+
+def braked_within(room, deceleration, period):
+    """Speed in m/s that ends within room in m, if the robot brakes, in m/s^2, after a period in s."""
+    return deceleration * (sqrt(period * period + 2 * max(room, 0.0) / deceleration) - period)
 
 
 def open_frame(boxes, places, resolution, border):

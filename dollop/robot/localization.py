@@ -47,8 +47,8 @@ BLOCK = 1 << 18
 SHORTEST, LONGEST = 1e-3, 1e3
 """m and rad: bounds of all lengths and angles of a `Localisation`."""
 LENGTHS = (
-    "sigma", "wide_sigma", "close_sigma", "lattice", "starting", "narrow", "believed_after", "given_up_after",
-    "carried", "loose",
+    "sigma", "wide_sigma", "close_sigma", "lattice", "starting", "narrow", "believed_after",
+    "given_up_after", "carried", "loose",
 )  # fmt: skip
 MOST = 1_000_000
 COUNTS = {
@@ -64,56 +64,55 @@ COUNTS = {
 
 @dataclass(frozen=True)
 class Localisation:
-    """By what a robot finds itself with odometry and laser, and when it believes that it has (reconstruction).
+    """By what a robot finds itself with odometry and laser, and when it is sure (reconstruction).
 
-    The defaults are those of a Pioneer 2 DX with a SICK LMS 200 in rooms. A laser that is less exact wants
-    a larger `sigma`, wheels that slip larger errors of the odometry.
+    The defaults are those of a Pioneer 2 DX with a SICK LMS 200 in rooms. A laser that is less
+    exact wants a larger `sigma`, wheels that slip larger errors of the odometry.
 
     Attributes
     ----------
     sigma, wide_sigma, close_sigma : float
-        Standard deviations in m of the likelihood field: for particles; for a lattice, which misses the
-        true pose; and to choose among places for a whole log.
+        Standard deviations in m of the likelihood field: for particles; for a lattice, which misses
+        the true pose; and to choose among places for a whole log.
     floor : float
         Likelihood, above 0 and below 1, of a beam that the map does not explain.
     independent : float
         Share of the beams that count: neighbours err together, where the map is wrong.
     beam_step, beams : int
-        Every which beam of a scan is used (CARMEN: one in three degrees), and about how many of a log's.
+        Every which beam of a scan is used (CARMEN: one in 3 degrees), and about how many of a log's.
     lattice, headings : float, int
         Distance in m between the places that are searched, and how many headings at each.
     tracking, searching : int
         Numbers of particles: while they agree (CARMEN's), and while they do not.
     starting, narrow : float
-        Standard deviations in m and rad: of particles round a pose that is told, and below which they
-        agree.
+        Standard deviations in m and rad: of particles round a pose that is told, and below which
+        they agree.
     believed_after, given_up_after : float
-        Angles in rad to turn until a pose that explains every scan is believed, and until the search
-        starts anew.
+        Angles in rad to turn until a pose that explains every scan is believed, and until the
+        search starts anew.
     lost, doubts : float, int
-        Share of its long average below which the fit of a scan is in doubt, and how many such scans, one
-        after the other, make a kidnapping.
+        Share of its long average below which the fit of a scan is in doubt, and how many such
+        scans, one after the other, make a kidnapping.
     usual_fit, forgetting : float
         Long average of the fit to begin with, and its gain per scan.
     along, aside, turned, twisted : float
-        Standard deviations of a step by odometry: shares of its way, along it and across; share of its
-        turn; and rad per m of its way.
+        Standard deviations of a step by odometry: shares of its way, along it and across; share of
+        its turn; and rad per m of its way.
     least_error : float
         m and rad that are added to each of them for every control period.
     carried : float
-        m and rad: a step in a log that differs so much from the odometry's was none: somebody carried
-        the robot.
+        m and rad: a step in a log that differs so much from the odometry's was none: somebody
+        carried the robot.
     rival : float
-        How much worse, in mean q, the second best place must explain a log's scans, or there is a note.
+        How much worse, in mean q, a second place must explain a log's scans, or there is a note.
     loose : float
-        Standard deviation in m along the weakest direction, of half of all scans of a log, from which on
-        there is a note.
+        Standard deviation in m along the weakest direction, of half of all scans of a log, from
+        which on there is a note.
 
     Raises
     ------
     ValueError
-        For what is no number of its kind, or contradicts another: a kidnapping that is never noticed, a
-        search that is given up before anything is believed.
+        For what is no number of its kind, or a search given up before anything is believed.
 
     Examples
     --------
@@ -164,7 +163,8 @@ class Localisation:
             raise ValueError(f"{rule}, got {self.given_up_after:g}")
 
     def _check_numbers(self, least, most, *names):
-        put_in(self, **{name: checked_number(name, getattr(self, name), least, most) for name in names})
+        for name in names:
+            put_in(self, **{name: checked_number(name, getattr(self, name), least, most)})
 
     @property
     def fits(self):
@@ -273,7 +273,8 @@ class MonteCarloLocalizer:
             self.start(pose)
 
     def _field_of(self, sigma):
-        return LikelihoodField(distances_to(self._surface, self._frame[1]), sigma, *self._frame, self.rules.floor)
+        distances = distances_to(self._surface, self._frame[1])
+        return LikelihoodField(distances, sigma, *self._frame, self.rules.floor)
 
     @property
     def localised(self):
@@ -320,7 +321,8 @@ class MonteCarloLocalizer:
             self.particles = self._draw(ends)
         elif moved:
             self.particles = moved_particles(self.particles, motion, self._rng, self.rules)
-        weights = softmax(self.rules.independent * self._field.log_likelihoods(self.particles, ends))
+        scores = self._field.log_likelihoods(self.particles, ends)
+        weights = softmax(self.rules.independent * scores)
         self.pose, self.spread = mean_pose(self.particles, weights)
         self.fit = float(self._field.values(self.pose[None], ends).mean()) if len(ends) else 0.0
         if moved:  # the same view again would be no new evidence
@@ -415,11 +417,13 @@ class MonteCarloLocalizer:
         weights = softmax(2 * rules.independent * scores)
         chosen = chosen[self._rng.choice(len(scores), rules.searching, p=weights)]
         mesh = [rules.lattice, rules.lattice, 2 * pi / rules.headings]
-        return self.lattice_poses(chosen) + self._rng.uniform(-0.5, 0.5, (rules.searching, 3)) * mesh
+        off = self._rng.uniform(-0.5, 0.5, (rules.searching, 3)) * mesh
+        return self.lattice_poses(chosen) + off
 
     def _resampled(self, weights):
         """Particles (N, 3) drawn with the weights by one comb, few if they agree."""
-        count = self.rules.tracking if self.spread.max() < self.rules.narrow else self.rules.searching
+        rules = self.rules
+        count = rules.tracking if self.spread.max() < rules.narrow else rules.searching
         comb = (np.arange(count) + self._rng.random()) / count
         return self.particles[np.searchsorted(np.cumsum(weights), comb).clip(max=len(weights) - 1)]
 
@@ -533,7 +537,7 @@ def lattice(free, background, rules):
 
 
 def moved_particles(particles, motion, rng, rules):
-    """Particles (N, 3) after a motion (3,) by odometry, each with an error of its own, as the rules have it."""
+    """Particles (N, 3) after a motion (3,) by odometry, each with an error by the rules."""
     way, turn = np.hypot(*motion[:2]), motion[2]
     errors = [error + rules.least_error for error in rules.errors(way, abs(turn))]
     ahead, left, turned = (rng.standard_normal((len(particles), 3)) * errors + motion).T

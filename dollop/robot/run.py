@@ -233,10 +233,17 @@ def run_of(rows, t, clearance, keeper, robot, reason, kidnapped, notes):
     apart = driven.to_subgoals()
     reached = apart <= keeper.needs() + slack
     reason = reason or driven.missed(reached, apart) or _cut_short(waits, robot.period)
-    notes = (*notes, *_unknown(table, starts, clearance), *_lost(table[:, 8] > 0, t), *driven.notes(t, kidnapped))
+    farthest = driven.farthest(keeper.rules.reach)
+    notes = (
+        *notes,
+        *_aside(farthest, keeper.known),
+        *_unknown(table, starts, clearance),
+        *_lost(table[:, 8] > 0, t),
+        *driven.notes(t, kidnapped),
+    )
     return Run(
         t, poses, true_poses, active, table[:, 8] > 0, clearance, not reason, reason, len(starts), kidnapped, way,
-        robot.radius, driven.done(keeper.done), reached, driven.farthest(keeper.rules.reach), waits, notes,
+        robot.radius, driven.done(keeper.done), reached, farthest, waits, notes,
     )  # fmt: skip
 
 
@@ -247,6 +254,14 @@ def _unknown(table, starts, clearance):
         x, y = table[there[0], 3:5]
         text = f"it touched something at ({x:.2f}, {y:.2f}), where its map has {clearance[there[0]]:.2f} m of room"
         yield Note("unknown", text)
+
+
+def _aside(farthest, obstacles):
+    """A note of how far off the way the robot was led, if by more than a thing as wide as itself needs."""
+    most = 2 * obstacles.radius + obstacles.rules.influence
+    if farthest > most:
+        rule = f"a thing to go round leads no more than {most:.2f} m off"
+        yield Note("aside", f"it was up to {farthest:.2f} m off the way, which is closed there: {rule}")
 
 
 def _lost(localised, t):

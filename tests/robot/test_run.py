@@ -176,3 +176,10 @@ def test_being_lost_and_leaping_is_told():
     run = perform(task(), Corrected((0.0, 0.0, 0.0)))
     assert run.finished and run.trusted and [note.kind for note in run.notes] == ["lost", "leap"]
     assert "for 1.0 s, first at 3.0 s" in run.notes[0].text and "leapt by 0.6" in run.notes[1].text
+
+
+def test_a_way_that_is_closed_and_gone_round_puts_the_run_in_doubt():
+    """It finishes, but two metres beside what was shown."""
+    run = perform(task([1.0, -2.0, 1.3, 2.0]), Unicycle((0.0, 0.0, 0.0)))
+    assert run.finished and run.farthest > 1.5 and not run.trusted
+    assert [note.kind for note in run.notes] == ["aside"]
