@@ -20,7 +20,8 @@ PACKAGE = ("dollop", "book/package.md", "pyproject.toml", "LICENSE", "MANIFEST.i
 TESTS = ("tests", "data", "benchmarks", "pyproject.toml")
 OF_THE_CHECKOUT = (
     "replication",
-    *("test_book.py", "test_house.py", "test_package.py", "test_project_files.py"),
+    *("test_book.py", "test_house.py", "test_own_log.py", "test_package.py", "test_project_files.py"),
+    "test_readme.py",
 )
 PYTEST = ("-m", "pytest", "-m", "not replication", "-p", "no:cacheprovider", "-n", "2", "-q")
 WHERE = "import dollop, os; print(os.path.dirname(dollop.__file__))"
