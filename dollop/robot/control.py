@@ -31,6 +31,8 @@ from dollop.robot.guidance import PIONEER_FOLLOWING, STEP
 
 __all__ = ["CONTROL_LAWS"]
 
+SOONEST = 1e-6
+"""Time in s that is none."""
 FACING = 0.1
 """Angle in rad within which a robot that stands looks where it should."""
 
@@ -103,10 +105,14 @@ class Supervisor:
 
     def notice_kidnapping(self, x, y):
         """Begin the segment in force afresh where the robot finds itself elsewhere."""
-        self.leapt = self.last is not None and dist(self.last, (x, y)) > self.jump
+        if self.last is None and self.waits and dist(self.guidance.law.start, (x, y)) > self.rules.reach:
+            self.waits, self.stood = [], {}  # whoever does not begin at the start does not wait there
+        jump = max(self.jump, 2 * self.limits.speed * self.elapsed)
+        self.leapt = self.last is not None and dist(self.last, (x, y)) > jump
         if self.leapt:
             if self.waits and self.waits[0][0]:  # carried off while it stood: back there
-                self.active, self.waits = self.waits[0][0] - 1, []
+                self.active = self.waits[0][0] - 1
+            self.waits = []
             self.handed_over = False  # nor has it done the task before it stands at the end
             self.restart()
         self.last, self.most = (x, y), inf
@@ -137,6 +143,13 @@ class Supervisor:
             self.active = segment
             self.restart()
 
+    def remap(self, guidance):
+        """Go on by another map, in the same segment and with the patience that is left."""
+        detoured = self.active in self.guidance.detours
+        self.guidance = guidance
+        if detoured:
+            guidance.detour(self.active)
+
     def begin(self, segment, waits, stood):
         """Put `segment` in force, where the robot is still to wait, and has waited, as told."""
         self.active, self.waits, self.stood = segment, waits, stood
@@ -155,7 +168,7 @@ class Supervisor:
         if self.standing:
             self.waits[0][1] = left - self.elapsed
             self.stood[place] += self.elapsed
-        if self.waits[0][1] < self.elapsed / 2:
+        if self.waits[0][1] < SOONEST:
             self.waits.pop(0)
         error = wrapped(self.guidance.headings[place] - theta)
         return 0.0, self.turning(error) if self.standing and abs(error) > FACING else 0.0
@@ -230,6 +243,9 @@ class Pursuit(Supervisor):
 
     def plan(self, x, y):
         """Roll the response out from x, y in m, and straight on beyond its end, to be pursued."""
+        while self.came and self.active + 1 < len(self.speeds):  # it need not come there again
+            self.hand_over(self.active + 1)
+            self.came = self.guidance.reached(self.active, x, y, self.rules.reach)
         self.places, self.segments = self.guidance.way(self.active, x, y)
         self.at, self.end = 0, len(self.places) - 1
         last = len(self.speeds) - 1
@@ -298,6 +314,11 @@ class Pursuit(Supervisor):
         """As any supervisor does, and come to the subgoal anew."""
         super().restart()
         self.came = False
+
+    def remap(self, guidance):
+        """As any supervisor does, and roll the response out anew."""
+        super().remap(guidance)
+        self.places, self.at = Pursuit.places, 0
 
     def insist(self):
         """As any supervisor does, and roll the response out anew."""

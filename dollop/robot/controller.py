@@ -25,7 +25,7 @@ from dollop.robot.run import run_of
 from dollop.robot.ways import WayKeeper
 from dollop.sequenced_lds import SequencedLDS
 
-__all__ = ["PERIODS", "Controller", "checked_radius"]
+__all__ = ["PERIODS", "Controller", "RobotError", "checked_radius"]
 
 SEARCH_TURN, BACK_OFF, PUSHED = 0.5, 0.1, 2.0
 """A robot that does not know where it is turns on the spot, in rad/s, and moves off what it
@@ -212,15 +212,18 @@ class Controller:
         ------
         ValueError
             For a pose that is no three numbers, or an elapsed time that is none or negative.
+        RobotError
+            Where the robot raises when it is asked for what it tells.
         """
         if self.over:
             return 0.0, 0.0
         period = self._robot.period
-        if elapsed is not None and self._rows:
-            self._late += checked_number("elapsed", elapsed, 0.0, LONGEST_RUN) - period
-        elapsed, now = period if elapsed is None else float(elapsed), self.time
+        if elapsed is not None:
+            elapsed = checked_number("elapsed", elapsed, 0.0, LONGEST_RUN) if self._rows else period
+            self._late += elapsed - period if self._rows else 0.0
+        elapsed, now = period if elapsed is None else elapsed, self.time
         lost = pose is None
-        x, y, theta = pose = _as_pose(pose)
+        x, y, theta = pose = _as_pose("the pose", pose)
         finite = isfinite(x + y + theta)
         localised = not lost and self._robot.localised
         touching = self._robot.touching
@@ -283,9 +286,16 @@ class Controller:
         Parameters
         ----------
         reason : str
+
+        Raises
+        ------
+        ValueError
+            For what is no text, or empty.
         """
+        if not checked_record("reason", reason, str):
+            raise ValueError("a task that is given up needs a reason, got ''")
         if not self.over:
-            self._stop(checked_record("reason", reason, str))
+            self._stop(reason)
 
     def run(self, kidnapped=()):
         """What has come of the task so far, and whether it was the task.
@@ -321,14 +331,14 @@ class Controller:
         )
 
 
-def _as_pose(pose):
+def _as_pose(name, pose):
     """A pose as three floats, NaN for one that nobody knows."""
     if pose is None:
         return np.nan, np.nan, np.nan
     try:
         x, y, theta = map(float, pose)
     except (TypeError, ValueError):
-        raise ValueError(f"the pose must be three numbers or None, got {told(pose)}") from None
+        raise ValueError(f"{name} must be three numbers or None, got {told(pose)}") from None
     return x, y, theta
 
 
@@ -358,21 +368,32 @@ class _Body:
     @property
     def localised(self):
         """Whether the robot trusts its pose."""
-        return self._robot.localised if self._doubts else True
+        return self._read("localised") if self._doubts else True
 
     @property
     def touching(self):
         """Whether it touches something, None if it cannot feel."""
-        return self._robot.touching if self._feels else None
+        return self._read("touching") if self._feels else None
 
     @property
     def noticed(self):
         """All that it has noticed so far."""
-        return self._robot.noticed if self._sees else None
+        return self._read("noticed") if self._sees else None
 
     def true_pose(self, pose):
         """Where it is, if it tells; else what it believes."""
-        return self._robot.true_pose if self._measured else pose
+        return _as_pose("true_pose", self._read("true_pose")) if self._measured else pose
+
+    def _read(self, name):
+        """What the robot tells."""
+        try:
+            return getattr(self._robot, name)
+        except Exception as error:
+            raise RobotError(f"the robot failed in {name} with {type(error).__name__}: {error}") from error
+
+
+class RobotError(RuntimeError):
+    """A robot that cannot tell what it is asked for."""
 
 
 def checked_radius(radius):

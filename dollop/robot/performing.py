@@ -25,7 +25,7 @@ from dollop.checks import (
 )
 from dollop.pose import moved_pose
 from dollop.robot.avoidance import PIONEER_AVOIDANCE, PIONEER_RADIUS
-from dollop.robot.controller import PERIODS, Controller, checked_radius
+from dollop.robot.controller import PERIODS, Controller, RobotError, checked_radius
 from dollop.robot.guidance import PIONEER_FOLLOWING, PIONEER_LIMITS, Limits
 
 __all__ = ["Unicycle", "perform"]
@@ -197,7 +197,11 @@ def perform(
             except Exception as error:
                 controller.give_up(_failed(controller, error))
                 break
-            command = controller.step(pose)
+            try:
+                command = controller.step(pose)
+            except RobotError as error:
+                controller.give_up(_failed(controller, error.__cause__))
+                break
             try:
                 robot.drive(*command)
             except Exception as error:
@@ -228,7 +232,8 @@ def check_robot(robot, kidnap):
         check_has("a robot to be kidnapped", robot, "place")
     checked_number("the robot's period", robot.period, *PERIODS)
     checked_flag("whether the robot is localised", robot.localised)
-    checked_array("the robot's pose", robot.pose, 3, finite=False)  # one that is lost may have none
+    if robot.localised or robot.pose is not None:  # one that is lost may have none
+        checked_array("the robot's pose", robot.pose, 3, finite=False)
     check_has("the robot's limits", robot.limits, *Limits._fields)
     Limits(*(getattr(robot.limits, name) for name in Limits._fields))
 

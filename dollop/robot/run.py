@@ -223,11 +223,11 @@ def run_of(rows, t, clearance, keeper, robot, reason, kidnapped, notes):
     table = np.array(rows, dtype=float)
     poses, true_poses, touching = table[:, :3], table[:, 3:6], table[:, 9]
     active, way = table[:, 6:8].astype(int).T
-    contact = clearance < 0 if np.isnan(touching[0]) else touching > 0
+    contact = np.where(np.isnan(touching), clearance < 0, touching > 0)
     starts = np.flatnonzero(contact & ~np.append(False, contact[:-1]))
     believed = np.where(table[:, 8:9] > 0, poses, nan)
     places = np.where(np.isfinite(true_poses), true_poses, believed)[:, :2]
-    driven = Driven.of(places, active, way, keeper)
+    driven = Driven.of(places, active, way, t, keeper)
     waits = np.reshape(keeper.waits(), (-1, 3))
     slack = 0.0 if np.array_equal(poses, true_poses, equal_nan=True) else ASTRAY
     apart = driven.to_subgoals()
@@ -276,7 +276,7 @@ def _lost(localised, t):
 def _cut_short(waits, period):
     """Why the waits (W, 3) were not those that were shown; empty if they were."""
     for place, shown, stood in waits:
-        if stood < shown - period:
+        if stood < shown - period and (place or stood):
             where = f"subgoal {place:.0f}" if place else "the start"
             return f"it stood {stood:.1f} s at {where} where {shown:.1f} s were shown"
     return ""
@@ -310,8 +310,8 @@ class Driven:
     lines: dict
 
     @classmethod
-    def of(cls, places, active, way, keeper):
-        """From places (N, 2) in m, and segments and ways (N,) in force."""
+    def of(cls, places, active, way, t, keeper):
+        """From places (N, 2) in m, and segments and ways (N,) in force at times (N,) in s."""
         lines = keeper.lines
         along, apart = np.full((2, len(places)), nan)
         for w, k in set(zip(way.tolist(), active.tolist(), strict=True)):
@@ -323,13 +323,14 @@ class Driven:
             if k and len(rows):  # it may have handed over before its subgoal
                 apart[rows] = np.minimum(apart[rows], _beside(places[rows], lines[w][k - 1])[1])
         steps = np.hypot(*np.diff(places, axis=0).T)
+        farthest = np.maximum(keeper.supervisor.jump, 2 * keeper.supervisor.limits.speed * np.diff(t))
         return cls(
             places,
             active,
             way,
             along,
             apart,
-            np.append(True, ~(steps <= keeper.supervisor.jump)),
+            np.append(True, ~(steps <= farthest)),
             lines,
         )
 
@@ -346,7 +347,7 @@ class Driven:
 
     def farthest(self, enough):
         """Largest distance in m from the way in force, from where the robot came within `enough` of it on."""
-        stretch = np.cumsum(self.leaps)
+        stretch = np.cumsum(self.leaps | (np.diff(self.way, prepend=self.way[0]) != 0))
         came = np.where(self.apart <= enough, np.arange(len(stretch)), len(stretch))
         first = np.full(stretch[-1] + 1, len(stretch))
         np.minimum.at(first, stretch, came)

@@ -21,7 +21,7 @@ from math import ceil, cos, inf, isfinite, sin
 
 import numpy as np
 
-from dollop.checks import Note
+from dollop.checks import Note, check_has
 from dollop.robot.control import CONTROL_LAWS
 from dollop.robot.geodesic import Geodesic
 from dollop.robot.guidance import AT_END, PIONEER_FOLLOWING, STEP, Guidance
@@ -283,7 +283,7 @@ class WayKeeper:
             rules,
         )
         self.noticed, self.felt, self.left = np.empty((0, 4)), np.empty((0, 4)), {}
-        self.begun, self.refused, self.lines, self.finer = False, "", {}, 1
+        self.begun, self.refused, self.lines, self.finer, self.joined = False, "", {}, 1, 0
         self.remap()
         self.enter(self.ways[0])
 
@@ -346,11 +346,11 @@ class WayKeeper:
         Returns
         -------
         list of [int, float, float]
-            Of each pause of the way in force: its place (0 the start, k the k-th subgoal), and how
-            long in s it was shown and kept.
+            Of each pause of the way in force, from where it was joined on: its place (0 the start, k
+            the k-th subgoal), and how long in s it was shown and kept.
         """
         supervisor = self.supervisor
-        shown = enumerate(supervisor.guidance.pauses)
+        shown = list(enumerate(supervisor.guidance.pauses))[self.joined + 1 if self.joined else 0 :]
         return [[k, s, supervisor.stood.get(k, 0.0)] for k, s in shown if s >= supervisor.period / 2]
 
     def notes(self):
@@ -419,13 +419,18 @@ class WayKeeper:
         way : Way
         segment : int, optional
         """
-        guidance, waited = Guidance(way.law, self.obstacles, self.rules), None
-        if segment is not None and way.index == self.way:
-            waited = self.supervisor.waits, self.supervisor.stood
+        guidance, waited, last = Guidance(way.law, self.obstacles, self.rules), ([], {}), None
+        if segment is not None:
+            last = self.supervisor.last
+            if way.index == self.way:
+                waited = self.supervisor.waits, self.supervisor.stood
+            else:
+                self.joined = segment
         self.way, self.lines[way.index] = way.index, guidance.lines
         self.supervisor = CONTROL_LAWS[self.control](guidance, way.law.speeds, self.robot, self.rules)
         if segment is not None:
-            self.supervisor.begin(segment, *(waited or ([], {})))
+            self.supervisor.begin(segment, *waited)
+            self.supervisor.last = last
 
     def command(self, x, y, theta, elapsed, standing):
         """v in m/s and omega in rad/s for a pose, on the way that fits and is free.
@@ -559,12 +564,18 @@ class WayKeeper:
         others = self.others(x, y) if stay.extra > 0 and len(self.ways) > 1 else []
         best = min([stay, *others], key=lambda each: each.extra)
         best = fitting([each for each in others if each.extra == 0] or [best])
-        self.enter(best.way, best.segment)
+        if best is stay:
+            self.supervisor.remap(Guidance(here.law, self.obstacles, self.rules))
+        else:
+            self.enter(best.way, best.segment)
 
     def _has_noticed(self):
         """Whether the robot has noticed something new, which is then mapped."""
         noticed = getattr(self.robot, "noticed", None)
-        if noticed is None or np.array_equal(noticed.boxes, self.noticed):
+        if noticed is None:
+            return False
+        check_has("what the robot noticed", noticed, "boxes")
+        if np.array_equal(noticed.boxes, self.noticed):
             return False
         self.noticed = noticed.boxes
         self.remap()

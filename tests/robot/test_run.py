@@ -57,7 +57,7 @@ def test_before_its_end_a_run_is_not_over():
 @pytest.mark.parametrize("control", ["plain", "pursuit"])
 def test_waits_are_kept_where_and_as_the_demonstrator_looked(control):
     """Two seconds at the start, four at the corner, one at the end: it stands there, and looks along the way."""
-    run = perform(task(pauses=[2.0, 4.0, 1.0]), Unicycle((0.0, 0.0, 1.0)), control)
+    run = perform(task(pauses=[2.0, 4.0, 1.0]), Unicycle((0.0, 0.1, 1.0)), control)
     assert run.finished and run.waits[:, 0].tolist() == [0, 1, 2]
     np.testing.assert_allclose(run.waits[:, 1:], [[2, 2], [4, 4], [1, 1]], atol=0.11)
     still = np.hypot(*np.diff(run.poses[:, :2], axis=0).T) < 1e-3
@@ -192,3 +192,106 @@ def test_carried_off_at_the_very_end_it_comes_back(control, before):
     end = perform(task(), Unicycle((0.0, 0.0, 0.0)), control).t[-1]
     run = perform(task(), Unicycle((0.0, 0.0, 0.0)), control, kidnap=[(end - before, (0.5, 2.0, 1.0))])
     assert run.finished and np.hypot(*(run.poses[-1, :2] - CORNER.subgoals[-1])) < 0.3
+
+
+class Trembling(Unicycle):
+    """Notices something far off, a millimetre elsewhere in every period."""
+
+    periods = 0
+
+    def drive(self, speed, turn):
+        self.periods += 1
+        super().drive(speed, turn)
+
+    @property
+    def noticed(self):
+        return Environment([[5.0, 5.0, 5.1 + 1e-3 * self.periods, 5.2]])
+
+
+@pytest.mark.parametrize("control", ["plain", "pursuit"])
+def test_what_is_noticed_anew_in_every_period_keeps_nobody_from_the_task(control):
+    """The map is another one each time, the segment and the patience are not."""
+    run = perform(task(pauses=[0.0, 2.0, 0.0]), Trembling((0.0, 0.0, 0.0)), control, timeout=60.0)
+    assert run.finished and run.waits[0, 2] == pytest.approx(2.0, abs=0.11)
+
+
+class Held(Trembling):
+    """Cannot move, and notices something else in every period."""
+
+    def drive(self, speed, turn):
+        self.periods += 1
+
+
+def test_patience_ends_whatever_is_noticed():
+    """A robot that is held fast gives up before the time-out."""
+    run = perform(task(), Held((0.0, 0.0, 0.0)), timeout=300.0)
+    assert not run.finished and "no progress" in run.reason and run.t[-1] < 150
+
+
+def test_who_begins_elsewhere_does_not_wait_for_the_start():
+    """The wait belongs to the start, and there the robot has not been."""
+    run = perform(task(pauses=[3.0, 0.0, 0.0]), Unicycle((-1.0, 1.0, 0.0)))
+    assert run.finished and run.waits.tolist() == [[0.0, 3.0, 0.0]]
+
+
+def test_a_late_loop_keeps_its_waits():
+    """Four periods late at every step."""
+    robot = Unicycle((0.0, 0.0, 0.0), period=0.05)
+    controller = Controller(task(pauses=[0.0, 3.1, 0.0]), robot)
+    while not controller.over:
+        speed, turn = controller.step(robot.pose, elapsed=0.2)
+        for _ in range(4):
+            robot.drive(speed, turn)
+    run = controller.run()
+    assert run.finished and 3.1 <= run.waits[0, 2] < 3.35 and run.trusted
+
+
+class Breaking(Unicycle):
+    """Its bumper falls off after two seconds."""
+
+    periods = 0
+
+    def drive(self, speed, turn):
+        self.periods += 1
+        super().drive(speed, turn)
+
+    @property
+    def touching(self):
+        if self.periods > 20:
+            raise OSError("bus")
+        return self.periods == 10 or None
+
+
+def test_a_robot_that_fails_to_tell_leaves_the_run_so_far():
+    """Whatever it is asked for; what it touched when it could tell is counted."""
+    run = perform(task(), Breaking((0.0, 0.0, 0.0)))
+    assert run.reason == "the robot failed at 2.1 s with OSError: bus" and len(run.t) == 21 and run.collisions == 1
+
+
+class Unmeasured(Unicycle):
+    """Nobody measures where it is but now and then."""
+
+    @property
+    def true_pose(self):
+        return self.pose if self.pose[0] < 1.0 else None
+
+
+def test_true_poses_that_nobody_has_are_none():
+    """What it believes is all there is."""
+    run = perform(task(), Unmeasured((0.0, 0.0, 0.0)))
+    assert run.finished and np.isnan(run.true_poses[-1]).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("true_pose", (1.0, 2.0), "true_pose must be three numbers or None"),
+        ("noticed", [[0, 0, 1, 1]], "what the robot noticed must have boxes"),
+    ],
+)
+def test_what_a_robot_tells_is_checked(name, value, message):
+    """At once, not after the drive."""
+    robot = Unicycle((0.0, 0.0, 0.0))
+    setattr(robot, name, value)
+    with pytest.raises(ValueError, match=message):
+        perform(task(), robot)

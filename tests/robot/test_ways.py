@@ -1,5 +1,6 @@
 """Ways: the one that fits the start and is free is driven, and changed where it is blocked; and bad input."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,6 +27,7 @@ def walk(*points):
 
 
 BETWEEN = walk((0, 0), (6, 0))
+SHARED = walk((0, 0), (0.8, 0), (0.8, 0.7), (1.4, 0), (6, 0)), walk((0, 0), (0.8, 0), (1.6, 2.6), (4.4, 2.6), (6, 0))
 ROUND = walk((0, 0), (1, 0), (1.6, 2.6), (4.4, 2.6), (6, 0))
 
 
@@ -341,3 +343,12 @@ def test_a_way_with_a_taken_subgoal_is_left_out():
     for box, way in (([5.8, -0.2, 6.2, 0.2], 1), ([5.8, 1.3, 6.2, 1.7], 0)):
         run = perform(task(box, ways=ends), Unicycle(START))
         assert run.finished and (run.way == way).all()
+
+
+def test_a_pause_that_was_kept_on_the_way_before_counts():
+    """Who waited, and changed ways then, is not told that it did not wait on the other way."""
+    pausing = [replace(way, pauses=np.r_[0.0, 2.0, np.zeros(len(way.segments) - 1)]) for way in SHARED]
+    both = task(ways=tuple(pausing))
+    run = perform(both, Noticing(START, (7.0, CLOSING)))
+    assert run.finished and run.way[-1] == 1 and 0 in run.way
+    assert [note.kind for note in run.notes if note.kind == "aside"] == []
