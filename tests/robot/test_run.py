@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dollop.environment import Environment
-from dollop.robot import Controller, Limits, Run, Unicycle, perform
+from dollop.robot import Controller, Following, Limits, Run, Unicycle, perform
 from dollop.sequenced_lds import SequencedLDS
 from dollop.trajectory import distance_to_polyline, resample
 
@@ -224,8 +224,9 @@ class Held(Trembling):
 
 def test_patience_ends_whatever_is_noticed():
     """A robot that is held fast gives up before the time-out."""
-    run = perform(task(), Held((0.0, 0.0, 0.0)), timeout=300.0)
-    assert not run.finished and "no progress" in run.reason and run.t[-1] < 150
+    robot = Held((0.0, 0.0, 0.0), Limits(0.5, 8.0, 0.5, 20.0), period=0.2)
+    run = perform(task(), robot, timeout=100.0, following=Following(patience=0.8))
+    assert not run.finished and "no progress" in run.reason and run.t[-1] < 20
 
 
 def test_who_begins_elsewhere_does_not_wait_for_the_start():
