@@ -179,9 +179,10 @@ class Controller:
     def step(self, pose, elapsed=None):
         """Speed and turning rate for the next period.
 
-        It never waits for anything. Most steps take some 0.1 ms, those that roll out the response
-        anew some 10 ms, those that look for a way round what is in the way some 0.1 s on a map of
-        10 m x 10 m.
+        It never waits for anything. Most steps take less than 0.1 ms, those that roll out the response
+        anew some 5 ms, those that look for a way round what is in the way, or take in what the robot
+        has noticed, some 0.05 s on a map of 10 m x 10 m; and before it gives up there is one that looks
+        closer, for up to a second.
 
         - **Limits**: the speeds are within the robot's, and change from step to step by no more than
           its accelerations allow in a period, but for braking before what is suddenly near.
