@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import dollop
 from dollop.cli.learning import as_data, as_lines, performing
+from dollop.cli.naming import check_written, outputs_of
 from dollop.cli.picturing import write_task
-from dollop.cli.telling import Result, busy, outputs_of, tell, tell_notes
+from dollop.cli.telling import Result, busy, tell, tell_notes
 from dollop.cli.watching import check_kind, load_map, map_files, read_log, watched
-from dollop.formats.kinds import PNG, TASK
-from dollop.formats.writing import Output, check_outputs
+from dollop.formats.kinds import TASK
+from dollop.formats.writing import Output
 
 __all__ = ["run"]
 
@@ -31,7 +32,7 @@ def run(options):
     """
     out, picture = outputs_of(options, ".json", "a task")
     read = [options.log, *map_files(options.map, "LOG", options.log)]
-    check_outputs([Output(out, TASK), Output(picture, PNG)], read)
+    check_written([Output(out, TASK)], read, picture, out)
     check_kind("TASK", options.task, [TASK], ("LOG", options.log))
     task = dollop.Task.load(options.task)
     log, background = (

@@ -7,11 +7,12 @@ import numpy as np
 import dollop
 from dollop.checks import checked_number, checked_whole
 from dollop.cli.kidnapping import draw_kidnappings
+from dollop.cli.naming import check_written, named, outputs_of, unused
 from dollop.cli.picturing import of_run, write_picture
-from dollop.cli.telling import Result, busy, command, named, outputs_of, tell
+from dollop.cli.telling import Result, busy, command, tell
 from dollop.cli.watching import check_kind, load_map, map_files
-from dollop.formats.kinds import GIF, PNG, RUN, TASK
-from dollop.formats.writing import Output, check_outputs, together
+from dollop.formats.kinds import GIF, RUN, TASK
+from dollop.formats.writing import Output, together
 from dollop.robot.tables import save_run
 
 __all__ = ["run", "verdict_of"]
@@ -60,10 +61,10 @@ MOST_KIDNAPPINGS = 1000
 def _outputs(options):
     """Paths of the run, its picture and its film, if they can be written and are no input."""
     out, picture = outputs_of(options, ".csv", "a run")
-    outputs = [Output(out, RUN), Output(picture, PNG)]
     film = None if options.film is None else named(options.film, ".gif", "--film", "a film")
-    outputs += [] if film is None else [Output(film, GIF)]
-    check_outputs(outputs, [options.task, *map_files(options.map, "TASK", options.task)])
+    outputs = [Output(out, RUN), *([] if film is None else [Output(film, GIF)])]
+    read = [options.task, *map_files(options.map, "TASK", options.task)]
+    check_written(outputs, read, picture, out)
     return out, picture, film
 
 
@@ -129,9 +130,9 @@ def _stood(run):
 def _next(run, options):
     """What to do with the task that was performed."""
     if not run.finished:
-        shown = _beside(options.out, "_shown.png")
+        shown = unused(_beside(options.out, "_shown.png"))
         return command("show", options.out, "--map", options.map, "--out", shown)
-    route = _beside(options.task, ".geojson")
+    route = unused(_beside(options.task, ".geojson"))
     return command("export", options.task, "--to", "nav2", "--out", route)
 
 
