@@ -10,7 +10,7 @@ import dollop
 from dollop.checks import checked_array
 from dollop.cli.learning import as_data, as_lines, performing
 from dollop.cli.naming import check_written, named, unused
-from dollop.cli.performing import verdict_of
+from dollop.cli.performing import ended, verdict_of
 from dollop.cli.picturing import of_run, of_task, write_picture
 from dollop.cli.telling import Result, busy, command, tell
 from dollop.cli.watching import check_kind, load_map, map_files
@@ -172,7 +172,7 @@ def _run(path, options, background):
     least = f"{known.min():.2f} m" if len(known) else "not known"
     lines = (
         f"{path}: a run of {len(done.t)} periods, {done.t[-1]:.1f} s",
-        "finished" if done.finished else f"not finished: {done.reason}",
+        ended(done),
         f"{done.collisions} contacts by the map, least clearance {least}",
         f"kidnapped {len(done.kidnapped)} x; localised {done.localised.mean():.0%} of the time",
     )
