@@ -53,7 +53,7 @@ def by_shell(seed, folder):
         if done.returncode == 3:
             last = done.stdout.splitlines()[0]
             doubts += [f"{words[0]}: {line}" for line in said if line.startswith("doubt")] or [f"{words[0]}: {last}"]
-        if "not finished: " in done.stdout:
+        if done.stdout.startswith("not finished"):
             return "not finished", done.stdout.splitlines()[0]
         if done.returncode not in (0, 3):
             return f"status {done.returncode}", f"{words[0]}: {said[-1:]}"

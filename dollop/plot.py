@@ -35,7 +35,7 @@ _WAIT = "#8A5A00"  # dark orange: times that are written beside a wait
 BACKGROUND = "#8C8C8C"  # grey: the background map, and how things were before
 TRUTH = "#56B4E9"  # light blue: where the user or an object really was
 ROBOT = "#F0E442"  # yellow
-_MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper
+_MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper; first contact of a run
 LATER = LinearSegmentedColormap.from_list("later", ["#9ECAE9", "#08306B"])  # blue, darker with time
 _FLOOR = "#E8E8E8"  # palest grey: free floor of a map
 _RAY = "#C3CED6"  # pale grey: the laser's rays
@@ -371,13 +371,17 @@ def runs(ax, runs):
     _contacts(ax, hit)
 
 
-def _contacts(ax, runs):
+_TOUCHING = {"colour": _MOST_LIKELY, "width": 2.0}
+"""Look of the rim where a run touched something: otherwise than the robot at the end, which may stand there."""
+
+
+def _contacts(ax, runs, colour="black", width=0.8):
     """The rim of the robot where each of some runs first touched something."""
     for run in runs:
-        rim = {"fill": False, "edgecolor": "black", "linewidth": 0.8, "zorder": 7}
+        rim = {"fill": False, "edgecolor": colour, "linewidth": width, "zorder": 7}
         ax.add_patch(Circle(_first_contact(run), getattr(run, "radius", _RIM), **rim))
     if runs:
-        look = {"color": "black", "markersize": 10, "fillstyle": "none", "markeredgewidth": 0.8}
+        look = {"color": colour, "markersize": 10, "fillstyle": "none", "markeredgewidth": width}
         ax.plot([], [], "o", label="first contact, robot's rim", **look)
 
 
@@ -507,7 +511,7 @@ def run(ax, run, task=None):
         ax.plot(*places[leap], "o", color="black", markersize=4, zorder=6)
         letter = ascii_lowercase[n % len(ascii_lowercase)]
         _write(ax, letter, places[leap], (0, 9), ha="center", va="center", weight="bold")
-    _contacts(ax, [run] if run.collisions else [])
+    _contacts(ax, [run] if run.collisions else [], **_TOUCHING)
     known = run.true_poses[np.isfinite(run.true_poses).all(axis=1)]
     if len(known):
         ax.plot(
@@ -563,10 +567,17 @@ def figure_of(draw, title=None):
         ax.margins(0.05)
         width, height = np.ptp([ax.get_xlim(), ax.get_ylim()], axis=1)
         figure.set_figheight(np.clip(0.8 + _WIDE * height / width, _LEAST_HIGH, _MOST_HIGH))
-        handles, labels = ax.get_legend_handles_labels()
-        if labels:
-            figure.legend(handles, labels, loc="outside lower center", ncols=4, columnspacing=1.2)
+        _legend_below(figure, *ax.get_legend_handles_labels())
         return figure
+
+
+def _legend_below(figure, handles, labels):
+    """The legend under the axes, of as many columns as the figure is wide enough for."""
+    for columns in (4, 3, 2, 1) if labels else ():
+        legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, columnspacing=1.2)
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()
 
 
 def png(draw, title=None):

@@ -261,6 +261,20 @@ def test_a_picture_is_the_same_each_time_and_its_plane_is_true():
     assert not ax.get_window_extent().overlaps(legend.get_window_extent())
 
 
+def test_a_long_legend_is_as_narrow_as_its_picture():
+    """Names that are too long for four columns are in fewer; all of it is in the picture."""
+
+    def draw(ax):
+        for k in range(6):
+            plot.path(ax, [[0, k], [1, k]], f"a way with a long name, {k}")
+
+    figure = plot.figure_of(draw)
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    box = legend.get_window_extent()
+    assert len(legend.get_texts()) == 6 and 0 <= box.x0 < box.x1 <= figure.bbox.width
+
+
 def test_a_whole_map_has_floor_and_walls(ax):
     """Free cells are pale, occupied ones grey, and both are in the legend."""
     plot.whole_map(ax, room_map())

@@ -3,11 +3,12 @@
 import argparse
 import os
 import sys
+import warnings
 from importlib import import_module
 from pathlib import Path
 
 import dollop
-from dollop.cli.options import degrees, number, numbers, user, whole, wholes
+from dollop.cli.options import PERFORMED, degrees, number, numbers, user, whole, wholes
 
 __all__ = ["in_one_line", "main", "replication"]
 
@@ -63,11 +64,19 @@ def in_one_line(program, work, *arguments):
     ------
     SystemExit
         With 1 and the message for what is refused, 130 when interrupted. If nobody reads what it
-        says (a pipe that is closed) the work is done all the same, and the status 1.
+        says (a pipe or stream that is closed) the work is done all the same, and the status 1.
     """
+    heard = sys.stdout is not None
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed from the beginning, as by >&-
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
     try:
-        work(*arguments)
+        with warnings.catch_warnings():
+            warnings.showwarning = _once()
+            work(*arguments)
         sys.stdout.flush()
+        if not heard:
+            sys.exit(f"{program}: standard output is closed: what was to be said could not be written")
     except BrokenPipeError:
         # Or Python would say so once more when it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -77,6 +86,19 @@ def in_one_line(program, work, *arguments):
     except KeyboardInterrupt as stop:
         print(f"\n{program}: stopped{f'; {stop}' if stop.args else ''}", file=sys.stderr)
         sys.exit(STOPPED)
+
+
+def _once():
+    """What tells each warning as one line, once; a stand-in for `warnings.showwarning`."""
+    told = set()
+
+    def tell(message, *_, **__):
+        text = " ".join(str(message).split())
+        if text not in told:
+            told.add(text)
+            print(f"note: {text}", file=sys.stderr)
+
+    return tell
 
 
 def _parser():
@@ -163,26 +185,21 @@ def _add_learn(add):
 
 
 def _add_perform(add):
-    """The arguments of dollop perform."""
+    """The arguments of dollop perform; what is not said is as in `PERFORMED`."""
     add("task", help="a task, .json")
     add("--map", required=True, help=f"walls and furniture: {MAP}")
     add("--out", required=True, metavar="RUN.csv", help="the run; a .png lands beside it")
-    add("--radius", type=number, default=0.25, metavar="M", help="of the robot (default: 0.25 m)")
+    add("--radius", type=number, metavar="M", help="of the robot (default: 0.25 m)")
     limits = "speed in m/s, turn in rad/s, their accelerations (default: 0.5,0.8,0.5,1.57, a Pioneer's)"
-    add("--limits", type=numbers, default=(0.5, 0.8, 0.5, 1.57), metavar="V,W,A,B", help=limits)
-    add(
-        "--period",
-        type=number,
-        default=0.1,
-        metavar="S",
-        help="of the control loop in s (default: 0.1)",
-    )
+    add("--limits", type=numbers, metavar="V,W,A,B", help=limits)
+    add("--period", type=number, metavar="S", help="of the control loop in s (default: 0.1)")
     how = "pursuit (default), or plain, the paper's kind"
-    add("--control", choices=("pursuit", "plain"), default="pursuit", help=how)
-    add("--kidnap", type=whole, default=0, metavar="N", help="put the robot N times somewhere else")
-    add("--seed", type=whole, default=0, help="of when and where to (default: 0)")
-    add("--timeout", type=number, default=600.0, metavar="S", help="give up after (default: 600 s)")
+    add("--control", choices=("pursuit", "plain"), help=how)
+    add("--kidnap", type=whole, metavar="N", help="put the robot N times somewhere else")
+    add("--seed", type=whole, help="of when and where to (default: 0)")
+    add("--timeout", type=number, metavar="S", help="give up after (default: 600 s)")
     add("--film", metavar="FILE.gif", help="a film of it, too")
+    add.__self__.set_defaults(**PERFORMED)
 
 
 def replication(module):

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import dollop
 from dollop.cli.learning import as_data, as_lines, performing
+from dollop.cli.naming import check_written, outputs_of
 from dollop.cli.picturing import write_task
-from dollop.cli.telling import Result, busy, outputs_of, tell, tell_notes
+from dollop.cli.telling import Result, busy, tell, tell_notes
 from dollop.cli.watching import check_kind, load_map, map_files, read_log, watched
-from dollop.formats.kinds import PNG, TASK
-from dollop.formats.writing import Output, check_outputs
+from dollop.formats.kinds import TASK
+from dollop.formats.writing import Output
 
-__all__ = ["run"]
+__all__ = ["how_to_say", "run"]
 
 ABOUT_USER = "people", "exchange", "pieces", "lost", "gap", "seen", "off the map", "speed"
 """Kinds of notes on who walks about, which says nothing of where objects stand."""
@@ -31,7 +32,7 @@ def run(options):
     """
     out, picture = outputs_of(options, ".json", "a task")
     read = [options.log, *map_files(options.map, "LOG", options.log)]
-    check_outputs([Output(out, TASK), Output(picture, PNG)], read)
+    check_written([Output(out, TASK)], read, picture, out)
     check_kind("TASK", options.task, [TASK], ("LOG", options.log))
     task = dollop.Task.load(options.task)
     log, background = (
@@ -70,14 +71,44 @@ def _adapted(task, now, options, seen):
         if matching is not None:
             raise
         why = str(error).split("; give matching=")[0]
-        raise ValueError(f"{why}; {_asked(task.environment, now)}") from None
+        raise ValueError(how_to_say(task, now, options.turned, why)) from None
 
 
-def _asked(before, now):
-    """How to say which object is which, beginning with what is most probable."""
-    probable = ",".join(map(str, dollop.match(before, now).partners.tolist()))
-    rule = "where each of the task's objects is now, -1 for one that is gone"
-    return f"say {rule}, as in --matching={probable}: then {_places(before)}; now {_places(now)}"
+def how_to_say(task, now, turned, why):
+    """Why it is refused, and how to say which object is which: by what is most probable, if that is possible.
+
+    Parameters
+    ----------
+    task : Task
+    now : Environment
+        Objects as they stand now.
+    turned : bool
+        As for `Task.adapt`.
+    why : str
+
+    Returns
+    -------
+    str
+    """
+    partners = dollop.match(task.environment, now).partners
+    places = f"then {_places(task.environment)}; now {_places(now)}"
+    if not len(now):
+        return f"none of the task's objects was found: {places}; the log must show where they stand"
+    probable = _possible(task, now, partners, turned)
+    if (partners < 0).all():
+        why = "none of the task's objects was found again"
+    rule = "say where each of the task's objects is now, -1 for one that is gone,"
+    example = f"as in --matching={','.join(map(str, probable))}" if probable else "with --matching=N,..."
+    return f"{why}; {rule} {example}: {places}"
+
+
+def _possible(task, now, partners, turned):
+    """The partners, if a task can be adapted by them; else none."""
+    try:
+        task.adapt(now, dollop.Matching.of_partners(partners), turned)
+    except ValueError:
+        return []
+    return partners.tolist()
 
 
 def check_matching(partners, before, now):
@@ -92,7 +123,7 @@ def check_matching(partners, before, now):
     Raises
     ------
     ValueError
-        For another number of them, or a number that no object has.
+        For another number of them, a number that no object has, or one that is there twice.
     """
     if len(partners) != len(before):
         rule = f"--matching must have a number for each of the task's {len(before)} objects"
@@ -101,6 +132,9 @@ def check_matching(partners, before, now):
     if wrong:
         rule = f"--matching must be of the {len(now)} objects seen now, 0 to {len(now) - 1}"
         raise ValueError(f"{rule}, got {wrong[0]}")
+    if len({each for each in partners if each >= 0}) < sum(each >= 0 for each in partners):
+        told = ",".join(map(str, partners))
+        raise ValueError(f"--matching must name no object twice, got {told}")
 
 
 def _places(environment):

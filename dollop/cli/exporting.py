@@ -1,6 +1,7 @@
 """dollop export: a task as what other robots' software drives."""
 
 import dollop
+from dollop.cli.naming import unused
 from dollop.cli.telling import Result, command, tell
 from dollop.cli.watching import check_kind
 from dollop.formats.kinds import TASK
@@ -30,7 +31,7 @@ def run(options):
     nodes, length = len(route.places), route.lengths.sum()
     near = f"at most {1000 * route.deviation:.1f} mm from the way of the law"
     line = f"{nodes} places over {length:.1f} m, {near}"
-    look = command("show", options.out, "--out", f"{options.out}.png")
+    look = command("show", options.out, "--out", unused(f"{options.out}.png"))
     data = {
         "places": nodes,
         "length": length,

@@ -12,14 +12,16 @@ ROOM = 0.1
 """m between the robot's edge and all that stands there, where it is put and on its way."""
 
 
-def draw_kidnappings(count, seconds, task, background, start, radius, seed):
-    """Times and poses at which a robot is put somewhere else.
+def draw_kidnappings(count, seconds, period, task, background, start, radius, seed):
+    """Times and poses at which a robot is put somewhere else, each in a control period of its own.
 
     Parameters
     ----------
     count : int
     seconds : float
         How long the run is that is disturbed.
+    period : float
+        Of the control loop in s: of two kidnappings within one, the first would never be noticed.
     task : Task
         Its objects are obstacles.
     background : OccupancyGrid
@@ -37,8 +39,12 @@ def draw_kidnappings(count, seconds, task, background, start, radius, seed):
     Raises
     ------
     ValueError
-        If there is no such place.
+        If there is no such place, or the run has fewer periods than that.
     """
+    most = round(seconds / period) + 1
+    if count > most:
+        raise ValueError(f"--kidnap must be at most {most} for a run of {seconds:.1f} s, got {count}")
+    left = max(seconds - (count - 1) * period, 0.0)
     rng = np.random.default_rng(seed)
     places = reachable(ObstacleMap.of(task.environment, background, radius=radius), start)
     if not len(places):
@@ -46,7 +52,7 @@ def draw_kidnappings(count, seconds, task, background, start, radius, seed):
         raise ValueError(f"{rule} that it can drive to, to be kidnapped there")
     chosen = places[rng.integers(len(places), size=count)]
     poses = np.column_stack([chosen, rng.uniform(-np.pi, np.pi, count)])
-    times = np.sort(rng.uniform(0, seconds, count))
+    times = np.sort(rng.uniform(0, left, count)) + period * np.arange(count)
     return list(zip(times.tolist(), map(tuple, poses.tolist()), strict=True))
 
 

@@ -1,13 +1,16 @@
 """dollop learn: a task from the logs of one or more demonstrations."""
 
+from pathlib import Path
+
 import numpy as np
 
 import dollop
+from dollop.cli.naming import check_written, outputs_of, unused
 from dollop.cli.picturing import write_task
-from dollop.cli.telling import Result, busy, command, outputs_of, tell, tell_notes
+from dollop.cli.telling import Result, busy, command, tell, tell_notes
 from dollop.cli.watching import load_map, map_files, read_log, tell_people, watched
-from dollop.formats.kinds import PNG, TASK
-from dollop.formats.writing import Output, check_outputs
+from dollop.formats.kinds import TASK
+from dollop.formats.writing import Output
 from dollop.trajectory import arc_length
 
 __all__ = ["as_data", "as_lines", "performing", "run"]
@@ -28,7 +31,7 @@ def run(options):
     """
     out, picture = outputs_of(options, ".json", "a task")
     read = [*options.logs, *map_files(options.map, "LOG", options.logs[0])]
-    check_outputs([Output(out, TASK), Output(picture, PNG)], read)
+    check_written([Output(out, TASK)], read, picture, out)
     users = _users(options)
     background = load_map(options.map, options.logs[0])
     pairs = zip(options.logs, users, strict=True)
@@ -127,7 +130,7 @@ def performing(out, map):
 
     Parameters
     ----------
-    out : Path
+    out : str or Path
         Of the task.
     map : str
 
@@ -135,4 +138,5 @@ def performing(out, map):
     -------
     str
     """
-    return command("perform", out, "--map", map, "--out", out.with_name(f"{out.stem}_run.csv"))
+    new = unused(Path(out).with_name(f"{Path(out).stem}_run.csv"), ".png")
+    return command("perform", out, "--map", map, "--out", new)

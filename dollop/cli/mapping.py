@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import dollop
+from dollop.cli.naming import check_written, unused
 from dollop.cli.telling import Result, busy, command, tell
 from dollop.cli.watching import read_log
 from dollop.formats.kinds import PNG
-from dollop.formats.writing import Output, check_outputs, together, whole_file
+from dollop.formats.writing import together, whole_file
 from dollop.gridmap import map_outputs
 
 __all__ = ["run"]
@@ -21,7 +22,7 @@ def run(options):
         Of the command line.
     """
     outputs, picture = map_outputs(options.map), _beside(options.map, ".png")
-    check_outputs([*outputs, Output(picture, PNG, options.map)], [options.log])
+    check_written(outputs, [options.log], picture, options.map)
     log = read_log(options.log, options)
     with busy("building the map"):
         grid = dollop.OccupancyGrid.from_log(log, options.resolution)
@@ -33,7 +34,7 @@ def run(options):
         *(each.path for each in outputs if str(each.path) != options.map),
         picture,
     ]
-    look = _beside(options.map, "_log.png")
+    look = unused(_beside(options.map, "_log.png"))
     look = command("show", options.log, "--map", options.map, "--out", look)
     tell(Result(_lines(grid, options.map), written, look, log.notes, _data(grid)), options.json)
 
@@ -49,7 +50,7 @@ def _lines(grid, path):
     """What the map is, and what to do with it, for people."""
     rows, columns = grid.occupancy.shape
     size = f"{columns * grid.resolution:.1f} m x {rows * grid.resolution:.1f} m"
-    then = command("learn", "WALK.log", "--map", path, "--out", "task.json")
+    then = command("learn", "WALK.log", "--map", path, "--out", unused("task.json", ".png"))
     return (
         f"a map of {size}, {grid.free.mean():.0%} of it free, at {grid.resolution:g} m per cell",
         f"with a log in which somebody walks: {then}",

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from dollop.cli.telling import Result, command, outputs_of, tell, tell_notes
+from dollop.cli.naming import check_written, outputs_of, unused
+from dollop.cli.telling import Result, command, tell, tell_notes
 from dollop.cli.watching import load_map, map_files, read_log, tell_people, watched
 from dollop.formats.kinds import EVERYBODY, PNG, TRAJECTORY
-from dollop.formats.writing import Output, check_outputs, together, whole_file
+from dollop.formats.writing import Output, together, whole_file
 from dollop.trajectory import arc_length
 
 __all__ = ["run", "said"]
@@ -51,9 +52,9 @@ def _outputs(options):
     tracks = [Path(options.tracks)] if options.tracks else []
     if any(path.suffix != ".csv" or path == out for path in tracks):
         raise ValueError(f"--tracks must be named .csv, and not as --out, got {options.tracks}")
-    outputs = [Output(out, TRAJECTORY), Output(picture, PNG)]
-    outputs += [Output(path, EVERYBODY) for path in tracks]
-    check_outputs(outputs, [options.log, *map_files(options.map, "LOG", options.log)])
+    outputs = [Output(out, TRAJECTORY), *(Output(path, EVERYBODY) for path in tracks)]
+    read = [options.log, *map_files(options.map, "LOG", options.log)]
+    check_written(outputs, read, picture, out)
     return out, picture
 
 
@@ -83,7 +84,7 @@ def _data(found):
 def _next(options):
     """The command that learns from what was observed."""
     words = ["learn", options.log, "--map", options.map, *said(options)]
-    return command(*words, "--out", Path(options.out).with_name("task.json"))
+    return command(*words, "--out", unused(Path(options.out).with_name("task.json"), ".png"))
 
 
 def said(options):

@@ -4,7 +4,18 @@ import argparse
 
 import numpy as np
 
-__all__ = ["degrees", "number", "numbers", "user", "whole", "wholes"]
+__all__ = ["PERFORMED", "degrees", "number", "numbers", "user", "whole", "wholes"]
+
+PERFORMED = {
+    "radius": 0.25,
+    "limits": (0.5, 0.8, 0.5, 1.57),
+    "period": 0.1,
+    "control": "pursuit",
+    "kidnap": 0,
+    "seed": 0,
+    "timeout": 600.0,
+}
+"""How a robot performs a task where nothing else is said: options and their values."""
 
 
 def number(text):

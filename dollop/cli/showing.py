@@ -2,19 +2,20 @@
 
 import csv
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 import dollop
 from dollop.checks import checked_array
-from dollop.cli.learning import as_data, as_lines
-from dollop.cli.performing import verdict_of
+from dollop.cli.learning import as_data, as_lines, performing
+from dollop.cli.naming import check_written, named, unused
+from dollop.cli.performing import ended, verdict_of
 from dollop.cli.picturing import of_run, of_task, write_picture
-from dollop.cli.telling import Result, busy, command, named, tell
+from dollop.cli.telling import Result, busy, command, tell
 from dollop.cli.watching import check_kind, load_map, map_files
 from dollop.formats import kinds
 from dollop.formats.files import FormatError, from_file, read_bytes, read_json, read_lines
-from dollop.formats.writing import Output, check_outputs
 from dollop.trajectory import arc_length
 
 __all__ = ["run"]
@@ -43,7 +44,7 @@ def run(options):
     """
     out = named(options.out, ".png", holds="a picture")
     maps = [] if options.map is None else map_files(options.map, "FILE", options.file)
-    check_outputs([Output(out, kinds.PNG)], [options.file, *maps])
+    check_written([], [options.file, *maps], out, options.file)
     shown = _shower(options.file)
     background = None if options.map is None else load_map(options.map)
     with busy(f"reading {options.file}"):
@@ -93,8 +94,10 @@ def _log(path, options, background):
     )
     data = {"kind": "log", "scans": scans, "beams": beams, "seconds": seconds, "fov": fov}
     data |= {"max_range": log.max_range, "moved": walked, "begin": log.t[0], "end": log.t[-1]}
-    words = ("map", path, "room.yaml") if options.map is None else ("observe", path, options.map)
-    then = command(*words)
+    if options.map is None:
+        then = command("map", path, unused("room.yaml", ".pgm", ".png"))
+    else:
+        then = command("observe", path, options.map, "--out", unused("user.csv", ".png"))
     return partial(_draw_log, log=log, background=background), lines, log.notes, data, then
 
 
@@ -154,9 +157,10 @@ def _task(path, options, background):
         f"{len(task.notes)} notes, {doubts} of them put it in doubt",
     )
     if options.map is None:
-        then = command("export", path, "--to", "csv", "--out", "path.csv")
+        new = unused(Path(path).with_name(f"{Path(path).stem}_path.csv"))
+        then = command("export", path, "--to", "csv", "--out", new)
     else:
-        then = command("perform", path, "--map", options.map, "--out", "run.csv")
+        then = performing(path, options.map)
     return of_task(task, background), lines, task.notes, {"kind": "task", **as_data(task)}, then
 
 
@@ -168,7 +172,7 @@ def _run(path, options, background):
     least = f"{known.min():.2f} m" if len(known) else "not known"
     lines = (
         f"{path}: a run of {len(done.t)} periods, {done.t[-1]:.1f} s",
-        "finished" if done.finished else f"not finished: {done.reason}",
+        ended(done),
         f"{done.collisions} contacts by the map, least clearance {least}",
         f"kidnapped {len(done.kidnapped)} x; localised {done.localised.mean():.0%} of the time",
     )

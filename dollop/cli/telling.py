@@ -12,7 +12,7 @@ import numpy as np
 
 from dollop.checks import trusted
 
-__all__ = ["IN_DOUBT", "Result", "busy", "command", "named", "outputs_of", "tell", "tell_notes"]
+__all__ = ["IN_DOUBT", "Result", "busy", "command", "tell", "tell_notes"]
 
 IN_DOUBT = 3
 """Exit status of a command that is done, with notes that put its result in doubt."""
@@ -130,61 +130,6 @@ def command(*words):
     """
     program = ["python", "-m", "dollop"] if Path(sys.argv[0]).name == "__main__.py" else ["dollop"]
     return shlex.join([*program, *map(str, words)])
-
-
-def named(path, suffix, option="--out", holds="what it writes"):
-    """A path, if its name says what it holds.
-
-    Parameters
-    ----------
-    path : str
-    suffix : str
-    option : str
-        How it is called on the command line.
-    holds : str
-        What it holds, for the error.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ValueError
-        If it is named otherwise.
-
-    Examples
-    --------
-    >>> named("task.txt", ".json", holds="a task")
-    Traceback (most recent call last):
-    ValueError: --out must be named .json (a task), got task.txt
-    """
-    if Path(path).suffix != suffix:
-        raise ValueError(f"{option} must be named {suffix} ({holds}), got {path}")
-    return Path(path)
-
-
-def outputs_of(options, suffix, holds):
-    """The file that --out names, and the picture that lands beside it.
-
-    Parameters
-    ----------
-    options : argparse.Namespace
-    suffix, holds : str
-        As for `named`.
-
-    Returns
-    -------
-    out : Path
-    picture : Path
-
-    Raises
-    ------
-    ValueError
-        If it is named otherwise.
-    """
-    out = named(options.out, suffix, holds=f"{holds}; its picture, .png, lands beside it")
-    return out, out.with_suffix(".png")
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from PIL import Image
 from places import DATA
 
 import dollop
+from dollop.cli.adapting import how_to_say
 
 LAB, EIGHTS = DATA / "lab.yaml", DATA / "figure_eights.log.gz"
 SLALOMS = DATA / "slalom_0.log.gz", DATA / "slalom_1.log.gz"
@@ -125,6 +126,19 @@ def test_who_passes_by_puts_no_adaptation_in_doubt(room, capsys, monkeypatch):
     assert dollop.Task.load("now.json").notes == notes[1:]
 
 
+def test_where_nothing_is_found_no_matching_is_advised(room, capsys, monkeypatch):
+    """A look without objects says so; one with others advises nothing that would be refused."""
+    words = ["adapt", "task.json", DATA / "empty_lab.log.gz", "--map", "lab.yaml", "--out", "now.json"]
+    said = call(capsys, *words)
+    assert said.status == 1 and "none of the task's objects was found: then 0 at" in said.err
+    assert "--matching" not in said.err
+    none = dollop.Matching.of_partners([-1, -1])
+    monkeypatch.setattr(dollop, "match", lambda *_, **__: none)
+    task, seen = dollop.Task.load("task.json"), observed(LOOK[2]).environment
+    told = how_to_say(task, seen, False, "why")
+    assert told.startswith("none of the task's objects was found again; say where") and "=-1" not in told
+
+
 @pytest.mark.skipif("DOLLOP_EXTERNAL_DATA" not in os.environ, reason="DOLLOP_EXTERNAL_DATA is not set")
 def test_what_cannot_be_matched_is_asked_for(room, capsys):
     """Two boxes that may have changed places: one line says how to say it, and with that it works."""
@@ -160,6 +174,7 @@ LOOK = ["adapt", "task.json", DATA / "moved_cans_0.log.gz", "--map", "lab.yaml",
         (["adapt", EIGHTS, "task.json", "--map", "lab.yaml", "--out", "a.json"], "are TASK and LOG swapped?"),
         (["adapt", "no.json", EIGHTS, "--map", "lab.yaml", "--out", "a.json"], "TASK must be a file that is there"),
         ([*LOOK, "--matching", "0"], "--matching must have a number for each of the task's 2 objects, got 1"),
+        ([*LOOK, "--matching", "1,1"], "--matching must name no object twice, got 1,1"),
         ([*LOOK, "--matching", "0,7"], "--matching must be of the 2 objects seen now, 0 to 1, got 7"),
         ([*LOOK[:-1], "lab.yaml"], "--out must be named .json"),
     ],

@@ -1,6 +1,8 @@
 """dollop perform: the run is that of the library, for the robot that was asked for; the table is read back."""
 
 import json
+import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,11 +74,40 @@ def test_kidnappings_are_drawn_from_the_seed(room, capsys):
 def test_a_run_that_is_not_finished_says_so_everywhere(room, capsys):
     """Status 3; the reason is said, and stands in the last row, also for programs."""
     said = call(capsys, *PERFORM, "--timeout", "2")
-    assert said.status == 3 and said.out.startswith("not finished: not finished within 2 s")
+    assert said.status == 3 and said.out.startswith("not finished within 2 s; ")
     assert pd.read_csv("run.csv").event.iloc[-1] == "not finished within 2 s"
-    assert said.next[0] == "show" and call(capsys, *said.next).status == 0
+    assert said.next[0] == "perform" and "--timeout=4" in said.next
     told = json.loads(call(capsys, *PERFORM, "--timeout", "2", "--json").out)
     assert told["finished"] is False and told["reason"] == "not finished within 2 s" and told["radius"] == 0.25
+
+
+def test_a_robot_that_is_too_large_is_offered_a_radius_that_fits(room, capsys):
+    """The next command has a smaller one, and all else that was said, and comes to its end."""
+    said = call(capsys, *PERFORM, "--radius", "1.5", "--period", "0.05")
+    assert said.status == 3 and said.out.startswith("not finished after 0.0 s: there is no ")
+    assert "--period=0.05" in said.next and any(each.startswith("--radius=") for each in said.next)
+    assert said.next[-1] == "run_2.csv" and call(capsys, *said.next).out.startswith("finished after")
+
+
+def test_many_kidnappings_are_each_in_a_period_of_its_own(room, capsys):
+    """As many as were asked for are in the run, and shown, however many those are."""
+    assert call(capsys, *PERFORM, "--kidnap", "100", "--timeout", "60").out
+    assert pd.read_csv("run.csv").event.fillna("").str.contains("kidnapped").sum() == 100
+    assert "kidnapped 100 x" in call(capsys, "show", "run.csv", "--out", "shown.png").out
+
+
+def test_a_place_that_the_map_has_not_seen_is_refused_with_what_helps(room, capsys):
+    """The map must have seen start and subgoals; the line says how to look at it, and that works."""
+    grid = dollop.OccupancyGrid.load("lab.yaml")
+    x, y = dollop.Task.load("task.json").law.start
+    row, column = ((np.array([y, x]) - grid.origin[::-1]) / grid.resolution).astype(int)
+    cells = grid.occupancy.copy()
+    cells[row - 3 : row + 4, column - 3 : column + 4] = np.nan
+    replace(grid, occupancy=cells).save("unseen.yaml")
+    said = call(capsys, *PERFORM, "--map", "unseen.yaml")
+    assert said.status == 1 and "must be free, got" in said.err and "a map that has seen the floor" in said.err
+    look = shlex.split(said.err.split("a look at it: ")[1])
+    assert call(capsys, *look[look.index("show") :]).status == 0
 
 
 def test_a_task_in_doubt_stays_in_doubt(room, capsys):
@@ -136,7 +167,8 @@ def test_a_damaged_run_is_refused_with_the_line(change, message, room, capsys):
         (["--radius", "-1"], "--radius must be in 0.001 to 100, got -1"),
         (["--kidnap", "-1"], "--kidnap must be a whole number, 0 to 1000, got -1"),
         (["--limits", "0,1,1,1"], "speed must be in 1e-06 to 1e+06, got 0.0"),
-        (["--limits", "1,1"], "limits"),
+        (["--limits", "1,1"], "--limits must be four numbers V,W,A,B, got 1,1"),
+        (["--kidnap", "1000"], "--kidnap must be at most"),
         (["--period", "0"], "period must be in 0.001 to 10, got 0.0"),
         (["--out", "run.txt"], "--out must be named .csv (a run"),
         (["--film", "run.mp4"], "--film must be named .gif (a film), got run.mp4"),

@@ -105,14 +105,14 @@ def test_a_map_has_a_picture_and_its_next_command_works(room, capsys):
     """The last line shows the log on the map; the line before says how to go on with a walk."""
     said = call(capsys, "map", DATA / "empty_lab.log.gz", "new.yaml")
     assert said.status == 0 and said.last.startswith("wrote new.yaml, new.pgm, new.png; next: ")
-    assert "dollop learn WALK.log --map new.yaml --out task.json" in said.out
+    assert "dollop learn WALK.log --map new.yaml --out task_2.json" in said.out
     assert call(capsys, *said.next).status == 0 and Path("new_log.png").exists()
 
 
 def test_observe_goes_on_with_its_own_options(room, capsys):
     """The next command learns from the same log, with the same user, and works when pasted."""
     said = call(capsys, "observe", DATA / "slalom_0.log.gz", "lab.yaml", "--user", "0", "--min-area", "0.02")
-    assert "--user=0" in said.next and said.next[-4:] == ["--min-area", "0.02", "--out", "task.json"]
+    assert "--user=0" in said.next and said.next[-4:] == ["--min-area", "0.02", "--out", "task_2.json"]
     assert call(capsys, *said.next).status == 0
 
 

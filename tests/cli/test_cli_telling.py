@@ -4,14 +4,16 @@ import io
 import json
 import os
 import struct
+import subprocess
 import sys
 import time
+import warnings
 
 import numpy as np
 import pytest
 
 from dollop.checks import Note
-from dollop.cli import telling
+from dollop.cli import in_one_line, telling
 
 DOUBT, KNOWN = Note("map", "it does not fit"), Note("in part", "it may be larger", doubt=False)
 
@@ -64,3 +66,27 @@ def test_only_a_terminal_is_told_of_what_takes_long(monkeypatch):
     with telling.busy("thinking hard"):
         time.sleep(0.2)
     assert "thinking hard: 00:00" in told and pipe.getvalue() == ""
+
+
+def test_warnings_are_notes_of_one_line_each_once(capsys):
+    """Neither the file of the library nor a line of its source is told."""
+
+    def work():
+        for _ in range(2):
+            for k in range(2):
+                warnings.warn(f"a scan\nis broken, {k}", stacklevel=1)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        in_one_line("dollop", work)
+    assert capsys.readouterr().err == "note: a scan is broken, 0\nnote: a scan is broken, 1\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="streams as POSIX has them")
+@pytest.mark.parametrize(("stream", "status"), [(">&-", 1), ("2>&-", 0), (">/dev/full", 1)])
+def test_a_stream_that_is_closed_or_full_ends_cleanly(stream, status, room):
+    """The work is done all the same; the status says that what it says could not be written, in a line."""
+    words = f"'{sys.executable}' -m dollop show task.json --out shown.png {stream}"
+    done = subprocess.run(words, shell=True, capture_output=True, text=True, timeout=60)
+    assert done.returncode == status and (room / "shown.png").exists()
+    assert done.stderr.startswith("dollop: ") == bool(status) and done.stderr.count("\n") == bool(status)
