@@ -182,6 +182,8 @@ def _add_learn(add):
     add("--user", type=user, action="append", metavar="WHO", help=who)
     how = "anchored (default): in the frames of the objects; paper: as the paper does"
     add("--method", choices=("anchored", "paper"), default="anchored", help=how)
+    exact = "mean error in m that each segment of the law keeps (default: 0.02)"
+    add("--tolerance", type=number, default=0.02, metavar="M", help=exact)
 
 
 def _add_perform(add):

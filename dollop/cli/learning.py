@@ -63,7 +63,7 @@ def _shown(path, user, background, options):
         tell_notes(found.notes, path)
         raise ValueError(f"nobody walks in {path}; tracks of something else: {len(found.tracks)}")
     tell_people(found, log.t[0], path)
-    return dollop.Demonstration.of(found)
+    return dollop.Demonstration.of(found, options.tolerance)
 
 
 def _shown_lines(task, errors, paths):

@@ -193,3 +193,11 @@ def test_no_usage_is_status_2(option, room, capsys):
     """An unknown method, no user, no number as others write it."""
     said = call(capsys, "learn", EIGHTS, "--map", "lab.yaml", "--out", "a.json", *option)
     assert said.status == 2 and option[0] in said.err
+
+
+def test_a_walk_that_cannot_be_kept_to_two_centimetres_is_kept_to_ten(room, capsys):
+    """--tolerance is that of the demonstrations: a looser law has fewer segments."""
+    said = call(capsys, "learn", EIGHTS, "--map", "lab.yaml", "--tolerance", "0.1", "--out", "loose.json")
+    loose, exact = (dollop.Task.load(name) for name in ("loose.json", "task.json"))
+    assert said.status == 0 and len(loose.law.segments) < len(exact.law.segments)
+    assert loose.demonstrations[0].tolerance == 0.1
