@@ -463,7 +463,7 @@ class ObstacleMap:
 
     @cached_property
     def _regions(self):
-        """(H, W) int array: which passable cells hang together, side by side or corner to corner; else 0."""
+        """(H, W) int array: which passable cells hang together; else 0."""
         return _regions(self._passable)
 
     def no_way(self, place, goal, reach):
@@ -568,7 +568,7 @@ class ObstacleMap:
             raise ValueError(f"{rule} that keeps {self.rules.tight:g} m, got a radius of {self.radius:g} m")
 
     def _near(self, place, reach):
-        """Index of the cells, (rows, columns), whose centres are within reach in m of a place; at least its own."""
+        """Rows and columns of the cells within reach in m of a place; at least its own."""
         rows, columns = self.distances.shape
         across, up = in_cells(*place, self.origin, self.resolution)
         column, row = (min(max(int(at), 0), size - 1) for at, size in ((across, columns), (up, rows)))
@@ -629,7 +629,7 @@ class ObstacleMap:
 
 
 def _regions(passable):
-    """Which of cells (H, W) hang together, side by side or corner to corner: a number from 1 on, else 0."""
+    """Which of cells (H, W) hang together, if only at corners: a number from 1 on, else 0."""
     return scipy.ndimage.label(passable, np.ones((3, 3)))[0]
 
 
@@ -639,7 +639,7 @@ def braked_within(room, deceleration, period):
 
 
 def open_frame(boxes, places, resolution, border):
-    """Lower left corner, cells' side and shape of a map that holds boxes (N, 4), places (M, 2), and a border in m."""
+    """Lower left corner, cells' side and shape of a map of boxes (N, 4), places (M, 2), border in m."""
     points = np.vstack([boxes.reshape(-1, 2), np.reshape(places, (-1, 2))])
     if not len(points):
         points = np.zeros((1, 2))

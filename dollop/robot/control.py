@@ -156,7 +156,7 @@ class Supervisor:
         self.restart()
 
     def expect_to_wait(self, place):
-        """Remember to stand at the start (0) or a subgoal, if the demonstrator did and the robot has not yet."""
+        """Remember to stand at the start (0) or a subgoal, if that was shown and is not done yet."""
         left = self.guidance.pauses[place] - self.stood.get(place, 0.0)
         if left >= self.period / 2:
             self.waits.append([place, left])

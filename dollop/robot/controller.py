@@ -33,7 +33,7 @@ touches, in m/s: back, and if that has not helped within so many s, forth."""
 HELD = 1.0
 """Time in s for which a robot goes on to move off what it touched."""
 LONGEST_RUN, MOST_PERIODS = 1e4, 1_000_000
-"""s and control periods after which any run is given up: three hours, or a quarter of one at a thousand a second."""
+"""s and control periods after which any run is given up: three hours, or a million periods."""
 PERIODS = 1e-3, 10.0
 """s: no motor is told more often what to do, and none is left alone for longer."""
 RADII = 1e-3, 100.0
@@ -267,7 +267,7 @@ class Controller:
         return None
 
     def _ramped(self, speed, turn, most):
-        """What is wished for as far as the limits allow, no faster than is safe; over where it stands at the end."""
+        """What is wished for within the limits, no faster than is safe; over where it stands at the end."""
         (last_speed, last_turn), (fastest, sharpest, step, turn_step) = self._last, self._most
         speed = max(-fastest, last_speed - step, min(speed, fastest, last_speed + step))
         turn = max(-sharpest, last_turn - turn_step, min(turn, sharpest, last_turn + turn_step))
@@ -344,7 +344,7 @@ def _as_pose(name, pose):
 
 
 class _Body:
-    """What a controller knows of a robot: its size, limits and period, and what it tells at every step."""
+    """A robot as a controller knows it: size, limits, period, and what it tells at every step."""
 
     def __init__(self, robot):
         check_has("robot", robot, "limits", "period")
@@ -482,7 +482,7 @@ def named_subgoals(law):
 
 
 def check_some_way(ways, obstacles, enough):
-    """Raise ValueError, that of the first, if in every way a named subgoal is off the map or blocked.
+    """Raise ValueError, that of the first, if every way has a subgoal off the map or blocked.
 
     It may lie in an obstacle if there is room for the robot within `enough` m of it.
     """

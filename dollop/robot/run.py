@@ -27,7 +27,7 @@ __all__ = ["Run", "run_of"]
 ASTRAY = 0.15
 """Distance in m by which a localisation that agrees with itself may be off."""
 TOUCHED = 0.1
-"""Distance in m between the robot's edge and all that is known, beyond which it touched something unknown."""
+"""Room in m from all that is known, beyond which a robot touched something unknown."""
 AT_ONCE = 1_000_000
 """Pairs of a place and a part of a line that are compared at once."""
 
@@ -257,7 +257,7 @@ def _unknown(table, starts, clearance):
 
 
 def _aside(farthest, obstacles):
-    """A note of how far off the way the robot was led, if by more than a thing as wide as itself needs."""
+    """A note of how far off the way it was led, if by more than a thing as wide as itself needs."""
     most = 2 * obstacles.radius + obstacles.rules.influence
     if farthest > most:
         rule = f"a thing to go round leads no more than {most:.2f} m off"
@@ -346,7 +346,7 @@ class Driven:
         return min(self.along[known[-1]] / max(self.length(self.way[-1]), STEP), 1.0) if len(known) else 0.0
 
     def farthest(self, enough):
-        """Largest distance in m from the way in force, from where the robot came within `enough` of it on."""
+        """Largest distance in m from the way, from where the robot came within `enough` of it on."""
         stretch = np.cumsum(self.leaps | (np.diff(self.way, prepend=self.way[0]) != 0))
         came = np.where(self.apart <= enough, np.arange(len(stretch)), len(stretch))
         first = np.full(stretch[-1] + 1, len(stretch))
@@ -355,7 +355,7 @@ class Driven:
         return float(np.nanmax(on)) if np.isfinite(on).any() else nan
 
     def to_subgoals(self):
-        """Least distance (K,) in m to each subgoal of the way in force at the end, while it led there or just had."""
+        """Least distance (K,) in m to each subgoal of the last way, while it led there or just had."""
         w = self.way[-1]
         least = np.full(len(self.lines[w]), np.inf)
         for k, line in enumerate(self.lines[w]):
@@ -375,7 +375,7 @@ class Driven:
         return ""
 
     def notes(self, t, kidnapped):
-        """Where the robot changed ways or leapt, and what it did not drive because it was put farther along."""
+        """Where the robot changed ways or leapt, and what it did not drive, put farther along."""
         steps = np.append(0.0, np.hypot(*np.diff(self.places, axis=0).T))
         told = (np.abs(np.subtract.outer(t, kidnapped)) <= 1.5 * np.diff(t[:2]).sum()).any(axis=1)
         leaps = np.flatnonzero(self.leaps & (steps > 0) & ~told)
@@ -419,7 +419,7 @@ def _beside(places, line):
 
 
 def _on_edge(places, line, at):
-    """Way in m to the place nearest to each of some (N, 2) in m on an edge each (N,), and the distances (N,)."""
+    """Way in m to the place nearest to each of some (N, 2), on an edge each (N,), and the distances."""
     tails, steps = line.places[at], line.places[at + 1] - line.places[at]
     offsets = places - tails
     share = np.clip((offsets * steps).sum(axis=1) / np.maximum((steps**2).sum(axis=1), 1e-18), 0, 1)

@@ -392,7 +392,7 @@ class WayKeeper:
         return ""
 
     def look_closer(self):
-        """Map what is known to stand there by finer cells, between which narrower ways lead straighter.
+        """Map what is known by finer cells, between which narrower ways lead straighter.
 
         Returns
         -------
