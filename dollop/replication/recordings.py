@@ -20,6 +20,7 @@ from dollop.gridmap import OccupancyGrid, map_outputs
 from dollop.lab.recording import outputs as recording_outputs
 from dollop.matching import match
 from dollop.observation import observe
+from dollop.replication.reconstruction import TOLD
 from dollop.replication.runs import free_poses
 from dollop.robot.avoidance import ObstacleMap
 from dollop.robot.performing import perform
@@ -164,12 +165,13 @@ class FigureEights:
 
 # A study asks for many seeds, one after the other: it keeps a few, and the figures' own.
 @lru_cache(maxsize=4)
-def figure_eights(seed=SEED):
+def figure_eights(seed=SEED, how=TOLD):
     """Simulate the five figure-eights of Fig. 6 (Sec. II).
 
     Parameters
     ----------
     seed : int
+    how : Reconstruction, optional
 
     Returns
     -------
@@ -437,7 +439,7 @@ class Slalom:
 
 
 @lru_cache(maxsize=6)
-def slalom(k, seed=SEED):
+def slalom(k, seed=SEED, how=TOLD):
     """Draw a row of cones, each moved somewhere else, and a walk past them.
 
     Parameters
@@ -445,6 +447,7 @@ def slalom(k, seed=SEED):
     k : int
         Which layout of those that have room for a walk.
     seed : int
+    how : Reconstruction, optional
 
     Returns
     -------

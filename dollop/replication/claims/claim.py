@@ -33,6 +33,9 @@ class Criterion:
     wanted : (float, float), optional
         The claim wants the mean over the seeds in here, the upper end included; without it the
         number is only told.
+    matters : float, optional
+        The smallest difference in this number that matters to anybody, in its unit; of what is
+        judged it must be told. Of a difference that is wanted, the range begins there.
     trials : int
         The number of a seed is the share of so many trials, 0 if it is no share. The interval of a
         share of one trial is Wilson's.
@@ -43,6 +46,7 @@ class Criterion:
     number: str
     meaning: str
     wanted: tuple | None = None
+    matters: float | None = None
     trials: int = 0
     timed: bool = False
 
@@ -67,6 +71,9 @@ class Claim:
     constructed : bool
         Whether the method as reconstructed makes it true or false whatever the data: then the
         experiment checks the program, and says nothing of the world.
+    choices : tuple of str
+        Fields of `Reconstruction` that its numbers may depend on. An experiment with choices is a
+        function of (seed, how).
     """
 
     id: str
@@ -75,14 +82,15 @@ class Claim:
     criteria: tuple
     experiment: Callable
     constructed: bool = False
+    choices: tuple = ()
 
 
-def claim(section, quote, *criteria, constructed=False):
+def claim(section, quote, *criteria, constructed=False, choices=()):
     """Register the decorated experiment as that of a claim, which has its name.
 
     Parameters
     ----------
-    section, quote, criteria, constructed
+    section, quote, criteria, constructed, choices
         As `Claim` has them.
 
     Returns
@@ -94,7 +102,7 @@ def claim(section, quote, *criteria, constructed=False):
 
     def register(experiment):
         id = experiment.__name__.rstrip("_")
-        REGISTRY[id] = Claim(id, section, quote, criteria, experiment, constructed)
+        REGISTRY[id] = Claim(id, section, quote, criteria, experiment, constructed, tuple(choices))
         return experiment
 
     return register

@@ -89,7 +89,7 @@ def bijections(n):
     "IV-A",
     "This means that the number of environment objects must be the same in all demonstrations of a "
     "task. In our experiments this has not shown itself as a problem",
-    Criterion("other_number", "share with another number of objects", (-inf, 0.05), 4),
+    Criterion("other_number", "share with another number of objects", (-inf, 0.05), trials=4),
 )
 def number(seed):
     """Share of demonstrations in which the robot sees another number of objects.
@@ -107,7 +107,7 @@ def number(seed):
     "VI",
     "we can compute environment matchings quickly and consistently",
     Criterion("seconds", "time for two objects, the paper's cost [s]", (0, 0.5), timed=True),
-    Criterion("literal", "share of layouts matched alike twice, the paper's cost", MOSTLY, 1),
+    Criterion("literal", "share of layouts matched alike twice, the paper's cost", MOSTLY, trials=1),
     Criterion("robust", "the same, robust matching", trials=1),
 )
 def consistent(seed):
@@ -143,7 +143,7 @@ def moved_eight(seed):
 @claim(
     "VI",
     "it is not difficult to contrive environments that result in counter-intuitive matchings",
-    Criterion("literal_exact_once", "share with one of ten exact layouts mismatched", (0.5, 1), 1),
+    Criterion("literal_exact_once", "share with one of ten exact layouts mismatched", (0.5, 1), trials=1),
     Criterion("literal_exact", "share of exact layouts with a corner matched wrong", trials=10),
     Criterion("literal_seen", "the same, boxes seen inexactly", trials=10),
     Criterion("robust_seen", "the same, robust matching", trials=10),
@@ -177,9 +177,9 @@ def counterintuitive(seed, layouts=10):
     "each LDS in the estimated trajectory adapts its response to these novel conditions, "
     "succeeding in determining what the user would have done: a “figure-eight” trajectory that "
     "avoids the obstacles",
-    Criterion("eight", "share of adapted laws that are still a figure-eight", MOSTLY, 1),
-    Criterion("law_clear", "share of adapted laws that touch no can", MOSTLY, 1),
-    Criterion("robot_clear", "share of runs that finish and touch nothing", MOSTLY, 1),
+    Criterion("eight", "share of adapted laws that are still a figure-eight", MOSTLY, trials=1),
+    Criterion("law_clear", "share of adapted laws that touch no can", MOSTLY, trials=1),
+    Criterion("robot_clear", "share of runs that finish and touch nothing", MOSTLY, trials=1),
     Criterion("refused", "share of layouts refused as ambiguous", trials=1),
     Criterion("subgoals_moved_m", "how far the subgoals moved [m]"),
     Criterion("eight_ours", "share of our adapted laws that are a figure-eight", trials=1),

@@ -192,7 +192,7 @@ def scaled(seed):
     "III",
     "this estimated trajectory appears to capture the intentions of the original trajectory: a "
     "“figure-eight” trajectory that avoids the obstacles",
-    Criterion("eight", "share of laws that go round the cans in opposite directions", MOSTLY, 1),
+    Criterion("eight", "share of laws that go round the cans in opposite directions", MOSTLY, trials=1),
     Criterion("clearance_m", "least distance from law to can [m]", MORE),
 )
 def figure(seed):

@@ -43,8 +43,8 @@ SPREADS = {"paper": SPREAD, "anchored": None}
     "V",
     "If the algorithm finds statistical similarities between the subgoals of different "
     "demonstrations, then the CDHMM is simplified by combining the similarities.",
-    Criterion("path_right", "share of most-likely paths with the task's six states", MOSTLY, 1),
-    Criterion("states_right", "share of CDHMMs with the right number of states", MOSTLY, 1),
+    Criterion("path_right", "share of most-likely paths with the task's six states", MOSTLY, trials=1),
+    Criterion("states_right", "share of CDHMMs with the right number of states", MOSTLY, trials=1),
     Criterion("states_more", "number of states minus the right one"),
     Criterion("share_left", "states, share of the subgoals merged"),
     Criterion("path_right_ours", "paths right, the spread being estimated", trials=1),
@@ -202,8 +202,8 @@ def shared(seed):
     "V",
     "Dollop is able to reproduce and generalize user actions if it has access to multiple "
     "demonstrations performed under different environment configurations",
-    Criterion("sides_right", "share of laws that pass every cone on the user's side", MOSTLY, 1),
-    Criterion("plain_clear", "share of runs under the plain law that touch nothing", MOSTLY, 1),
+    Criterion("sides_right", "share of laws that pass every cone on the user's side", MOSTLY, trials=1),
+    Criterion("plain_clear", "share of runs under the plain law that touch nothing", MOSTLY, trials=1),
     Criterion("refused", "share of layouts refused as ambiguous", trials=1),
     Criterion("sides_right_ours", "share of our laws that pass every cone rightly", trials=1),
     Criterion("plain_clear_ours", "share of plain runs under our law that touch nothing", trials=1),

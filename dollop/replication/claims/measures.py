@@ -7,6 +7,7 @@ told beside it, in numbers that end in "ours".
 import numpy as np
 
 from dollop.replication import recordings
+from dollop.replication.reconstruction import TOLD
 from dollop.robot.performing import Unicycle, perform
 from dollop.trajectory import arc_length, distance_to_polyline
 
@@ -151,7 +152,7 @@ def clear_of(law, scene, method="paper"):
     return apart.min()
 
 
-def plain_run(task, start, **choices):
+def plain_run(task, start, how=TOLD, **choices):
     """A run under the paper's law, which knows no obstacles, of a robot that knows where it is.
 
     Parameters
@@ -159,6 +160,7 @@ def plain_run(task, start, **choices):
     task : Task
     start : (3,) sequence of float
         Pose in m and rad.
+    how : Reconstruction, optional
     **choices
         More of what `dollop.perform` takes.
 

@@ -552,7 +552,7 @@ def stroll(scene, rng, rounds=16, speed=0.5):
 @claim(
     "II",
     "During one demonstration the Kalman filter temporarily lost track of the user.",
-    Criterion("lost_per_lap", "share of the laps in which the user was lost", (0.036, 0.624), 5),
+    Criterion("lost_per_lap", "share of the laps in which the user was lost", (0.036, 0.624), trials=5),
 )
 def loss(seed):
     """How often a lap loses the user, who is then found again as another track.

@@ -31,7 +31,7 @@ KIDNAPPINGS = 5
     "fairly close to the predicted path.",
     Criterion("mean_m", "mean distance of the robot from the response [m]", (0.01, 0.1)),
     Criterion("max_m", "largest distance [m]", (0, 0.25)),
-    Criterion("finished", "share of runs that finished", MOSTLY, 1),
+    Criterion("finished", "share of runs that finished", MOSTLY, trials=1),
 )
 def follow(seed):
     """How far from the response a run of the robot is.
@@ -51,8 +51,8 @@ def follow(seed):
     "III",
     "It is coincidental that none of the responses to the kidnapping resulting in Agent Orange "
     "hitting the obstacles, or laboratory walls",
-    Criterion("hit", "share of kidnapped runs that hit something", (0.05, 1), KIDNAPPINGS),
-    Criterion("five_missed", "share of five runs in which none does", (-inf, 0.5), 1),
+    Criterion("hit", "share of kidnapped runs that hit something", (0.05, 1), trials=KIDNAPPINGS),
+    Criterion("five_missed", "share of five runs in which none does", (-inf, 0.5), trials=1),
     Criterion("hit_before_back", "share that hit something on the way back", trials=KIDNAPPINGS),
 )
 def luck(seed):
@@ -111,8 +111,8 @@ def between_segments(law, places):
 @claim(
     "III",
     "the response of Agent Orange to being kidnapped seems to be a reasonable estimate of user intent",
-    Criterion("returned", "share that come back, touching nothing before", MOSTLY, KIDNAPPINGS),
-    Criterion("finished", "share that finish, touching nothing", MOSTLY, KIDNAPPINGS),
+    Criterion("returned", "share that come back, touching nothing before", MOSTLY, trials=KIDNAPPINGS),
+    Criterion("finished", "share that finish, touching nothing", MOSTLY, trials=KIDNAPPINGS),
     Criterion("goes_on", "share of these that go on as the user did", MOSTLY),
     Criterion("heading_deg", "angle to the user's direction until back [degrees]", (-inf, 45)),
     Criterion("return_s", "time until it is back [s]"),
