@@ -1,26 +1,35 @@
 """Claims on the environment configuration: matching it, and moving with it (Secs I, IV, VI)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from inspect import signature
 from itertools import permutations
-from math import inf
+from math import inf, nan
 from timeit import repeat
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment, linprog
 from scipy.spatial.distance import cdist
 
-from dollop.association import associate
 from dollop.environment import Environment, corner_indices, integer_costs, spring_forces
 from dollop.lab.drawn import random_layouts
 from dollop.lab.person import figure_eight, slalom, walk
 from dollop.lab.scenes import Scene, figure_eight_scene, object_gaps, rearranged, slalom_scene
 from dollop.lab.things import Object
 from dollop.learning.paper import anchors
-from dollop.matching import Matching, match
+from dollop.matching import match
 from dollop.observation import observe
 from dollop.replication import peers, recordings
+from dollop.replication.choosing import (
+    LAWS,
+    TIES,
+    adapted,
+    gait_of,
+    response_of,
+    seen_by,
+    shown_as,
+    task_of,
+)
 from dollop.replication.claims.claim import MOSTLY, NONE, Criterion, claim, unknown
 from dollop.replication.claims.measures import clear_of, error_of, is_eight, plain_run
 from dollop.replication.draws import drawn_until_room
@@ -32,10 +41,8 @@ from dollop.trajectory import distance_to_polyline
 __all__ = []
 
 SEEN = ("laser_noise", "walker")
-SHOWN = ("lds", "tolerance", "cuts", "laid", *SEEN)
-"""What a law of one demonstration depends on, by either method."""
-MOVED = (*SHOWN, "weights", "corners")
-"""And one that has moved with the objects, by the paper's method."""
+SHOWN = (*SEEN, *LAWS)
+"""What a demonstration depends on, and so its law."""
 
 
 # ---- matching
@@ -186,7 +193,7 @@ def consistent(seed, how=TOLD):
     ten. A time cannot fail and is told. Rightly: most corners of every object go to the object that it
     is, from left to right.
     """
-    cans, cones = cans_looked_at(seed, how), cones_looked_at(seed, how)
+    cans, cones = (look(seed, how.only(SEEN)) for look in (cans_looked_at, cones_looked_at))
     numbers = {"seconds": least_time(lambda: match(cans.before, cans.looks[0], method="literal"))}
     for name, looked in (("", cans), ("_cones", cones)):
         found = [matched_as(looked.before, now, "literal") for now in looked.looks]
@@ -227,25 +234,26 @@ class LookedAt:
 @lru_cache(maxsize=2)
 def cans_looked_at(seed, how=TOLD):
     """The figure-eight's cans, moved by 0.4 m (sd along each axis), at least 1 m from all else."""
-    shown = recordings.figure_eights(seed, how)
-    return looked_at(shown.demonstration, figure_eight_scene(), [seed, 8], 0.4, 1.0)
+    before = recordings.figure_eights(seed, how).observation.environment
+    return looked_at(before, seen_by(figure_eight_scene(), how), [seed, 8], 0.4, 1.0)
 
 
 @lru_cache(maxsize=2)
 def cones_looked_at(seed, how=TOLD):
     """The slalom's cones, moved by 0.25 m from a row of their own, at least 0.6 m from all else."""
-    return looked_at(recordings.slalom(0, seed, how).demonstration, slalom_scene(), [seed, 18], 0.25, 0.6)
+    before = recordings.slalom(0, seed, how).demonstration.environment
+    return looked_at(before, seen_by(slalom_scene(), how), [seed, 18], 0.25, 0.6)
 
 
-def looked_at(demonstration, scene, seed, reach, spacing):
-    """A demonstration's objects, and two looks at where those of a scene have moved to."""
+def looked_at(before, scene, seed, reach, spacing):
+    """An environment, and two looks at where the objects of a scene have moved to."""
     from dollop.lab import watch
 
-    rng, before = np.random.default_rng(seed), in_order(demonstration.environment)
+    rng = np.random.default_rng(seed)
     moved, draws = drawn_until_room(lambda _: rearranged(scene, rng, reach, spacing, attempts=1), 10_000)
     logs = [watch(moved, [*seed, k]).log for k in range(2)]
     looks = tuple(in_order(observe(log, recordings.background_map()).environment) for log in logs)
-    return LookedAt(before, looks, moved, draws)
+    return LookedAt(in_order(before), looks, moved, draws)
 
 
 def in_order(environment):
@@ -281,7 +289,10 @@ def counterintuitive(seed, layouts=10):
     numbers = {"contrived": np.mean(tries <= 50), "contrived_ten": np.mean(tries <= 10)}
     freely = [tries_to_contrive(rng, both=0.3) for _ in range(layouts)]
     seen = [tries_to_contrive(rng, 10, noise=0.05) for _ in range(layouts)]
-    numbers |= {"contrived_freely": np.mean(np.isfinite(freely)), "contrived_seen": np.mean(np.isfinite(seen))}
+    numbers |= {
+        "contrived_freely": np.mean(np.isfinite(freely)),
+        "contrived_seen": np.mean(np.isfinite(seen)),
+    }
     for name, noise in (("random", 0.0), ("random_seen", 0.05)):
         drawn = [random_layouts(3, rng, noise=noise) for _ in range(layouts)]
         found = [match(before, after, method="literal").indices for before, after, _ in drawn]
@@ -364,7 +375,7 @@ def right_ahead(before, after):
     Criterion("law_clear_ours", "share of ours that touch no can", trials=1),
     Criterion("robot_clear_ours", "share of our runs that finish and touch nothing", trials=1),
     Criterion("draws", "layouts drawn until one has room"),
-    choices=(*MOVED, "reach", "gain"),
+    choices=(*SHOWN, *TIES, "learning", "reach", "gain"),
 )
 def moved(seed, how=TOLD):
     """Whether the law among moved cans is still a figure-eight and, like the robot, clear of them.
@@ -373,22 +384,28 @@ def moved(seed, how=TOLD):
     apart, seen by the laser and matched; one run under the plain law. By the paper's method, and by
     ours from the same start. Mostly: nine times of ten; one of twenty more or less matters.
     """
-    looked, shown = cans_looked_at(seed, how), recordings.figure_eights(seed, how)
+    looked, shown = cans_looked_at(seed, how.only(SEEN)), recordings.figure_eights(seed, how)
+    now, scene, told = looked.looks[0], looked.scene, {"draws": looked.draws}
     try:
-        as_paper, ours = (each.adapt(looked.looks[0]) for each in (shown.task_as_paper, shown.task))
+        as_paper, ours = adapted(shown.task_as_paper, now, how), shown.task.adapt(now)
     except ValueError:  # an ambiguous matching: it asks instead of guessing
-        return unknown("moved") | {"refused": 1.0, "draws": looked.draws}
+        return unknown("moved") | told | {"refused": 1.0}
     (start,) = recordings.starts_near_the_beginning(as_paper, 1, np.random.default_rng([seed, 9]))
-    moved_by = as_paper.law.subgoals - shown.task_as_paper.law.subgoals
-    numbers = {
-        "refused": 0.0,
-        "subgoals_moved_m": np.linalg.norm(moved_by, axis=1).mean(),
-        "draws": looked.draws,
-    }
     run = plain_run(as_paper, start, how)
-    numbers |= as_shown(as_paper.law, looked.scene, "paper", run)
-    run = perform(ours, Unicycle(start), background=recordings.background_map())
-    return numbers | {f"{name}_ours": value for name, value in as_shown(ours.law, looked.scene, "held", run).items()}
+    our_run = perform(ours, Unicycle(start), background=recordings.background_map())
+    told |= {
+        "refused": 0.0,
+        "subgoals_moved_m": moved_on_average(shown.task_as_paper.law, as_paper.law),
+    }
+    told |= as_shown(as_paper.law, scene, response_of(how), run)
+    return told | {f"{name}_ours": each for name, each in as_shown(ours.law, scene, "held", our_run).items()}
+
+
+def moved_on_average(before, after):
+    """Mean distance in m by which the subgoals of a law moved; nan where their number is another."""
+    if len(before.subgoals) != len(after.subgoals):
+        return nan
+    return np.linalg.norm(after.subgoals - before.subgoals, axis=1).mean()
 
 
 def as_shown(law, scene, method, run):
@@ -416,7 +433,7 @@ def as_shown(law, scene, method, run):
     Criterion("ours_cones_m", "two cones moved: the same [m]"),
     Criterion("draws", "a can moved: layouts drawn until one has room"),
     Criterion("draws_cones", "two cones moved: the same"),
-    choices=MOVED,
+    choices=(*SHOWN, *TIES, "learning"),
 )
 def single(seed, how=TOLD):
     """How far a DMP, the adapted law and a law trained anew are from what a user walks there.
@@ -431,10 +448,10 @@ def single(seed, how=TOLD):
     mm at most. Nothing where not all objects are matched with confidence.
     """
     numbers = {}
-    for name, there in (("", can_moved(seed, how)), ("_cones", cones_moved(seed, how))):
+    for name, there in moved_each_way(seed, how):
         numbers |= {f"draws{name}": there.draws}
         try:
-            found = errors_there(there)
+            found = errors_there(there, how)
         except ValueError:  # an ambiguous matching: it asks instead of guessing
             continue
         numbers |= {f"{which}{name}_m": value for which, value in found.items()}
@@ -452,32 +469,43 @@ class Elsewhere:
     draws: int
 
 
-def errors_there(there):
+def moved_each_way(seed, how):
+    """Endings of numbers, and where objects moved: a can, two cones."""
+    chosen = how.only(SHOWN)
+    return ("", can_moved(seed, chosen)), ("_cones", cones_moved(seed, chosen))
+
+
+def errors_there(there, how=TOLD):
     """Differences of the errors of laws and a DMP where objects have moved, in m; ValueError if none."""
-    task = Task.of(there.shown, method="paper")
-    adapted = task.adapt(there.now)
-    if (adapted.objects < 0).any():
-        raise ValueError("all objects must be matched with confidence")
-    error, retrained = (
-        error_of(adapted.law, there.walks),
-        error_of(Task.of(there.again, "paper").law, there.walks),
-    )
-    centres = task.environment.centres, there.now.centres[adapted.objects]
+    task, method = task_of(there.shown, how), response_of(how)
+    now = adapted_surely(task, there.now, how)
+    laws = now.law, task_of(there.again, how).law, task.law
+    error, retrained, left = (error_of(law, there.walks, method) for law in laws)
+    centres = task.environment.centres, there.now.centres[now.objects]
+    ours = Task.of(there.shown).adapt(there.now).law
     return {
-        "dmp_more": error_of_dmp(there, task.law, adapted.law, similarity(*centres, turning=False)) - error,
+        "dmp_more": error_of_dmp(there, task.law, now.law, similarity(*centres, turning=False)) - error,
         "adapted_more": error - retrained,
         "retrained": retrained,
-        "left_more": error_of(task.law, there.walks) - error,
-        "ours": error_of(Task.of(there.shown).adapt(there.now).law, there.walks, "held"),
+        "left_more": left - error,
+        "ours": error_of(ours, there.walks, "held"),
     }
 
 
-def error_of_dmp(there, law, adapted, whole):
+def adapted_surely(task, environment, how):
+    """The task where the objects stand now; ValueError where not all are matched with confidence."""
+    now = adapted(task, environment, how)
+    if (now.objects < 0).any():
+        raise ValueError("all objects must be matched with confidence")
+    return now
+
+
+def error_of_dmp(there, law, moved, whole):
     """Error in m of a DMP of what was shown: with new ends, or scaled and shifted, the better one."""
     factor, shift = whole
     ends = anchors(law)[[0, -1]] @ (1, 1j) * factor + shift
     path = [peers.mean_walk(there.shown.walks)]
-    moved_ends = peers.dmp(path, anchors(adapted)[[0, -1]], stiffness=STIFF)
+    moved_ends = peers.dmp(path, anchors(moved)[[0, -1]], stiffness=STIFF)
     scaled = peers.dmp(path, np.column_stack([ends.real, ends.imag]), factor.real, STIFF)
     return min(walks_off(there.walks, way) for way in (moved_ends, scaled))
 
@@ -500,26 +528,26 @@ def can_moved(seed, how=TOLD):
         positions = figure_eight_scene().positions.copy()
         positions[rng.integers(2)] += rng.normal(0, 0.4, 2)
         scene = with_room(figure_eight_scene(), positions, 0.45)
-        walks = [figure_eight(scene, rng, laps=1, stand=0.0, **recordings.KEPT) for _ in range(3)]
-        return scene, walks, figure_eight(scene, rng, **recordings.KEPT)
+        walks = [figure_eight(scene, rng, laps=1, stand=0.0, **gait) for _ in range(3)]
+        return scene, walks, figure_eight(scene, rng, **gait)
 
-    shown = recordings.figure_eights(seed, how).demonstration
+    gait, shown = recordings.KEPT | gait_of(how), recordings.figure_eights(seed, how).demonstration
     return elsewhere(shown, *drawn_until_room(draw), [seed, 17], how)
 
 
 @lru_cache(maxsize=2)
 def cones_moved(seed, how=TOLD):
     """The slalom where two of the four cones have moved."""
-    before = recordings.slalom(0, seed, how)
 
     def draw(k):
         rng = np.random.default_rng([seed, 21, k])
         positions = before.scene.positions.copy()
         positions[rng.choice(4, 2, replace=False)] += rng.normal(0, 0.4, (2, 2))
         scene = with_room(before.scene, positions, 0.6)
-        walks = [slalom(scene, rng, stand=0.0, **recordings.KEPT) for _ in range(3)]
-        return scene, walks, slalom(scene, rng, **recordings.KEPT)
+        walks = [slalom(scene, rng, stand=0.0, **gait) for _ in range(3)]
+        return scene, walks, slalom(scene, rng, **gait)
 
+    gait, before = recordings.KEPT | gait_of(how), recordings.slalom(0, seed, how)
     return elsewhere(before.demonstration, *drawn_until_room(draw), [seed, 21], how)
 
 
@@ -536,9 +564,13 @@ def elsewhere(shown, drawn, draws, seed, how):
     from dollop.lab import record, watch
 
     scene, walks, again = drawn
-    now = observe(watch(scene, seed).log, recordings.background_map()).environment
-    again = Demonstration.of(observe(record(scene, [*seed, 1], [again]).log, recordings.background_map()))
-    return Elsewhere(shown, now, again, [each.positions[::5] for each in walks], draws)
+    logs = (
+        watch(seen_by(scene, how), seed).log,
+        record(seen_by(scene, how), [*seed, 1], [again]).log,
+    )
+    look, trained = (observe(log, recordings.background_map()) for log in logs)
+    positions = [each.positions[::5] for each in walks]
+    return Elsewhere(shown, look.environment, shown_as(Demonstration.of(trained), how), positions, draws)
 
 
 def similarity(before, after, turning=True):
@@ -565,7 +597,7 @@ def similarity(before, after, turning=True):
     Criterion("two_cones_m", "m = 2: the same [m]"),
     Criterion("four_cones_m", "m = 4: the same [m]"),
     Criterion("eight_cones_m", "m = 8, half of all corners: the same [m]"),
-    choices=tuple(each for each in MOVED if each != "corners"),
+    choices=(*SHOWN, "weights"),
 )
 def nearest(seed, how=TOLD):
     """How much it matters which m, of which the paper names none: 1, 2, 4 or 8.
@@ -575,10 +607,10 @@ def nearest(seed, how=TOLD):
     centimetre apart at most, a fifth of a cell. Nothing where not all objects are matched with
     confidence.
     """
-    numbers = {}
-    for name, there in (("", can_moved(seed, how)), ("_cones", cones_moved(seed, how))):
+    numbers, chosen = {}, how.only((*SHOWN, "weights"))
+    for name, there in moved_each_way(seed, how):
         try:
-            errors = [error_with(there, m) for m in (1, 2, 4, 8)]
+            errors = [error_with(there, replace(chosen, corners=m)) for m in (1, 2, 4, 8)]
         except ValueError:  # an ambiguous matching: it asks instead of guessing
             continue
         words = ("one", "two", "four", "eight")
@@ -587,15 +619,9 @@ def nearest(seed, how=TOLD):
     return unknown("nearest") | numbers
 
 
-def error_with(there, m):
-    """Error in m of the law whose subgoals are tied to the m nearest corners; ValueError if unsure."""
-    task = Task.of(there.shown, method="paper")
-    objects = task.adapt(there.now).objects
-    if (objects < 0).any():
-        raise ValueError("all objects must be matched with confidence")
-    tied = associate(anchors(task.law), task.environment, m)
-    start, *subgoals = tied.relocate(there.now, Matching.of_partners(objects))
-    return error_of(task.law.with_subgoals(subgoals, start), there.walks)
+def error_with(there, how):
+    """Error in m of the adapted law as it is chosen, by the paper's learning; ValueError if unsure."""
+    return error_of(adapted_surely(task_of(there.shown, how), there.now, how).law, there.walks)
 
 
 # ---- what a user must say
@@ -623,11 +649,12 @@ def settings(seed, how=TOLD):
     shown = [
         recordings.figure_eights(seed, how),
         recordings.slalom(0, seed, how),
-        round_a_corner(seed, how),
+        round_a_corner(seed, how.only(SHOWN)),
     ]
     numbers = settings_counted()
     rng = np.random.default_rng([seed, 22])
-    runs, ours = zip(*(performances(each, rng, how) for each in shown), strict=True)
+    chosen = how.only((*SHOWN, "reach", "gain"))
+    runs, ours = zip(*(performances(each, rng, chosen) for each in shown), strict=True)
     away = np.array([run_off(run, each) for run, each in zip(runs, shown, strict=True)])
     well = [went_well(run, each) for run, each in zip(runs, shown, strict=True)]
     well_ours = [went_well(run, each) for run, each in zip(ours, shown, strict=True)]
@@ -660,7 +687,7 @@ def settings_counted(calls=(observe, Demonstration.of, learn, Task.adapt, perfor
 
 def performances(shown, rng, how):
     """Runs from one start of what was shown: by the paper's learning and plain law, and by ours."""
-    as_paper, ours = learn([shown.demonstration], method="paper"), learn([shown.demonstration])
+    as_paper, ours = task_of(shown.demonstration, how), learn([shown.demonstration])
     (start,) = recordings.starts_near_the_beginning(as_paper, 1, rng)
     return plain_run(as_paper, start, how), perform(ours, Unicycle(start), background=recordings.background_map())
 
@@ -687,6 +714,7 @@ def round_a_corner(seed, how=TOLD):
         inside = (aside - ahead) / np.sqrt(2)
         places = corner + np.array([(z.real, z.imag) for z in (*way, 0.8 * inside, -0.9 * inside)])
         scene = Scene([Object.trash_can(places[5]), Object.cone(places[6])])
-        return recordings.Slalom(scene, walk(places[:5], scene, rng, **recordings.KEPT), [seed, 23])
+        walked = walk(places[:5], scene, rng, **recordings.KEPT, **gait_of(how))
+        return recordings.Slalom(seen_by(scene, how), walked, [seed, 23])
 
-    return drawn_until_room(draw)[0]
+    return recordings.ChosenSlalom(drawn_until_room(draw)[0], how)
