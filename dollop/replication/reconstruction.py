@@ -4,9 +4,9 @@ Every experiment takes one, so that it can be asked what its number would be had
 chosen (`dollop.replication.universes`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
-__all__ = ["TOLD", "Reconstruction"]
+__all__ = ["LEVELS", "TOLD", "Reconstruction"]
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Reconstruction:
     weights : float
         Power of the inverse distance that weighs a corner.
     corners : int
-        m, the number of nearest corners that a subgoal is tied to.
+        m, the number of nearest corners that a subgoal is tied to; all where there are no more.
     merging : {"evidence", "spread"}
         By what subgoals are merged: Bayesian evidence, or nearness as the spread has it.
     spread : float
@@ -40,11 +40,11 @@ class Reconstruction:
     gain : float
         How eagerly the robot turns, as a multiple of the usual.
     laser_noise : float
-        Standard deviation of a reading in m.
+        Standard deviation of a reading in m; pixels mix as much more or less often.
     motion_noise : float
         Spectral density in m²/s³ that the Kalman filter expects.
-    walker : {"torso", "wide", "legs"}
-        What the laser meets.
+    walker : {"torso", "swaying", "legs"}
+        What the laser meets: a torso, one that sways and drifts twice as far, or two legs.
     """
 
     lds: str = "re-timed"
@@ -52,7 +52,7 @@ class Reconstruction:
     cuts: str = "mean"
     laid: str = "warped"
     weights: float = 2.0
-    corners: int = 4
+    corners: int = 16
     merging: str = "evidence"
     spread: float = 0.15
     learning: str = "paper"
@@ -62,6 +62,56 @@ class Reconstruction:
     motion_noise: float = 0.5
     walker: str = "torso"
 
+    def only(self, names):
+        """The same with all other fields as they are told.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Fields.
+
+        Returns
+        -------
+        Reconstruction
+
+        Examples
+        --------
+        >>> how = Reconstruction(tolerance=0.04, walker="legs")
+        >>> how.only(["walker", "gain"]) == Reconstruction(walker="legs")
+        True
+        """
+        return replace(TOLD, **{name: getattr(self, name) for name in names})
+
+    def changed(self):
+        """What is other than told.
+
+        Returns
+        -------
+        dict
+            Value by field.
+        """
+        pairs = ((each.name, getattr(self, each.name)) for each in fields(self))
+        return {name: value for name, value in pairs if value != getattr(TOLD, name)}
+
 
 TOLD = Reconstruction()
 """What REPLICATION.md tells, and the claims are judged by."""
+
+LEVELS = {
+    "lds": ("re-timed", "raw"),
+    "tolerance": (0.020, 0.010, 0.040),
+    "cuts": ("mean", "largest", "six"),
+    "laid": ("warped", "even"),
+    "weights": (2.0, 1.0, 4.0),
+    "corners": (16, 4),
+    "merging": ("evidence", "spread"),
+    "spread": (0.15, 0.10, 0.25),
+    "learning": ("paper", "anchored"),
+    "reach": (0.25, 0.15, 0.40),
+    "gain": (1.0, 0.5, 2.0),
+    "laser_noise": (0.005, 0.0, 0.015),
+    "motion_noise": (0.5, 0.1, 2.0),
+    "walker": ("torso", "swaying", "legs"),
+}
+"""What else a field could reasonably be, that which is told first; nobody who reads the paper can say
+which. Noise of a reading: none, the data sheet's, three times as much."""

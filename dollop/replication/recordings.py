@@ -3,7 +3,7 @@
 The set-ups are the paper's where it tells them; numbers, seeds and layouts are our own.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache, partial
 from itertools import chain
 from pathlib import Path
@@ -20,11 +20,12 @@ from dollop.gridmap import OccupancyGrid, map_outputs
 from dollop.lab.recording import outputs as recording_outputs
 from dollop.matching import match
 from dollop.observation import observe
-from dollop.replication.reconstruction import TOLD
+from dollop.replication.choosing import LAWS, TIES, as_paper, gait_of, seen_by, shown_as, task_of
+from dollop.replication.reconstruction import TOLD, Reconstruction
 from dollop.replication.runs import free_poses
 from dollop.robot.avoidance import ObstacleMap
 from dollop.robot.performing import perform
-from dollop.task import Demonstration, Task, learn
+from dollop.task import Demonstration, learn
 from dollop.trajectory import arc_length, at_arc_length
 
 __all__ = [
@@ -45,6 +46,9 @@ LAYOUTS = ((0.1, 0.4), (0.0, -0.7)), ((0.9, -0.4), (-0.7, -0.4)), ((-0.4, -0.6),
 KEPT = {"from_background": 0.30}
 """Walks of the figures and claims keep so far from the background, in m, shoulder to wall: the radius
 of Sec. II swallows what is nearer. A layout without room for that is drawn anew."""
+
+SEEN = ("laser_noise", "walker")
+"""Fields of a `Reconstruction` on which a recording depends."""
 
 
 def save_all(folder):
@@ -136,19 +140,24 @@ class FigureEights:
         The same by the paper's method, for what the paper says of it.
     """
 
-    recording: lab.Recording
+    seed: int
+    how: Reconstruction = TOLD
 
-    @cached_property
+    @property
+    def recording(self):
+        return _eights_recorded(self.seed, self.how.only(SEEN))
+
+    @property
     def observation(self):
-        return observe(self.recording.log, background_map())
+        return _eights_observed(self.seed, self.how.only(SEEN))
 
-    @cached_property
+    @property
     def observed_as_paper(self):
-        return observe(self.recording.log, background_map(), method="paper")
+        return _eights_observed_as_paper(self.seed, self.how.only((*SEEN, "motion_noise")))
 
     @cached_property
     def demonstration(self):
-        return Demonstration.of(self.observation)
+        return shown_as(Demonstration.of(self.observation), self.how)
 
     @cached_property
     def laps(self):
@@ -156,15 +165,13 @@ class FigureEights:
 
     @cached_property
     def task(self):
-        return Task.of(self.demonstration)
+        return task_of(self.demonstration, replace(self.how, learning="anchored"))
 
     @cached_property
     def task_as_paper(self):
-        return Task.of(self.demonstration, method="paper")
+        return task_of(self.demonstration, self.how)
 
 
-# A study asks for many seeds, one after the other: it keeps a few, and the figures' own.
-@lru_cache(maxsize=4)
 def figure_eights(seed=SEED, how=TOLD):
     """Simulate the five figure-eights of Fig. 6 (Sec. II).
 
@@ -177,7 +184,31 @@ def figure_eights(seed=SEED, how=TOLD):
     -------
     FigureEights
     """
-    return FigureEights(lab.record_figure_eights(seed, **KEPT))
+    return _figure_eights(seed, how.only((*SEEN, "motion_noise", *LAWS, *TIES, "learning")))
+
+
+# A study asks for many seeds, one after the other: it keeps a few, and the figures' own. What is chosen
+# later does not make it begin anew.
+@lru_cache(maxsize=4)
+def _figure_eights(seed, how):
+    return FigureEights(seed, how)
+
+
+@lru_cache(maxsize=4)
+def _eights_recorded(seed, how):
+    scene = seen_by(lab.figure_eight_scene(), how)
+    return lab.record_figure_eights(seed, scene=scene, **KEPT, **gait_of(how))
+
+
+@lru_cache(maxsize=4)
+def _eights_observed(seed, how):
+    return observe(_eights_recorded(seed, how).log, background_map())
+
+
+@lru_cache(maxsize=4)
+def _eights_observed_as_paper(seed, how):
+    log = _eights_recorded(seed, how.only(SEEN)).log
+    return observe(log, background_map(), **as_paper(how))
 
 
 @cache
@@ -421,7 +452,7 @@ class Slalom:
         Seed of the laser's noise.
     recording : Recording
         What the laser saw, and the truth.
-    demonstration : Demonstration
+    observed : Demonstration
         What Dollop made of it.
     """
 
@@ -434,11 +465,43 @@ class Slalom:
         return lab.record(self.scene, self.noise, [self.walk])
 
     @cached_property
-    def demonstration(self):
+    def observed(self):
         return Demonstration.of(observe(self.recording.log, background_map()))
 
 
-@lru_cache(maxsize=6)
+@dataclass(frozen=True, eq=False)
+class ChosenSlalom:
+    """The same with what is chosen of its law.
+
+    Attributes
+    ----------
+    seen : Slalom
+    how : Reconstruction
+    scene, walk, recording
+        As of `seen`.
+    demonstration : Demonstration
+    """
+
+    seen: Slalom
+    how: Reconstruction
+
+    @property
+    def scene(self):
+        return self.seen.scene
+
+    @property
+    def walk(self):
+        return self.seen.walk
+
+    @property
+    def recording(self):
+        return self.seen.recording
+
+    @cached_property
+    def demonstration(self):
+        return shown_as(self.seen.observed, self.how)
+
+
 def slalom(k, seed=SEED, how=TOLD):
     """Draw a row of cones, each moved somewhere else, and a walk past them.
 
@@ -451,18 +514,28 @@ def slalom(k, seed=SEED, how=TOLD):
 
     Returns
     -------
-    Slalom
+    ChosenSlalom
 
     Raises
     ------
     RuntimeError
         No such layout in a hundred draws.
     """
+    return _slalom(k, seed, how.only((*SEEN, *LAWS)))
+
+
+@lru_cache(maxsize=6)
+def _slalom(k, seed, how):
+    return ChosenSlalom(_slalom_walked(k, seed, how.only(SEEN)), how)
+
+
+@lru_cache(maxsize=6)
+def _slalom_walked(k, seed, how):
     rng = np.random.default_rng([seed, 11, k])
     for _ in range(100):
         try:
-            scene = lab.rearranged(lab.slalom_scene(), rng, reach=0.25, spacing=0.6)
-            return Slalom(scene, lab.slalom(scene, rng, **KEPT), [seed, 11, k])
+            scene = seen_by(lab.rearranged(lab.slalom_scene(), rng, reach=0.25, spacing=0.6), how)
+            return Slalom(scene, lab.slalom(scene, rng, **KEPT, **gait_of(how)), [seed, 11, k])
         except ValueError:  # no room to walk among these
             continue
     raise RuntimeError("no layout with room for a slalom in 100 draws")

@@ -7,6 +7,7 @@ told beside it, in numbers that end in "ours".
 import numpy as np
 
 from dollop.replication import recordings
+from dollop.replication.choosing import following_of
 from dollop.replication.reconstruction import TOLD
 from dollop.robot.performing import Unicycle, perform
 from dollop.trajectory import arc_length, distance_to_polyline
@@ -169,4 +170,5 @@ def plain_run(task, start, how=TOLD, **choices):
     Run
     """
     robot, grid = Unicycle(start), recordings.background_map()
+    choices = {"following": following_of(how), **choices}
     return perform(task, robot, control="plain", avoid=False, background=grid, **choices)
