@@ -42,7 +42,7 @@ NEAR = recordings.KEPT["from_background"]
 
 @lru_cache(maxsize=2)
 def walks_again(seed, how=TOLD):
-    """The first slalom of a seed, and the same person walking it five times more in the same layout.
+    """The first slalom of a seed, and the same person walking it five times more.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def eight_near(rng, how=TOLD):
 
 
 def straight_near(rng, how=TOLD, length=2.5):
-    """A straight walk along wall or furniture of the empty laboratory, near to it all the way.
+    """A straight walk along wall or furniture before the laser, near to them all the way.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def straight_near(rng, how=TOLD, length=2.5):
     walk : Walk
     """
     scene = seen_by(Scene(), how)
-    low, high = np.split(scene.room.bounds, 2)
+    (low, high), pose = np.split(scene.room.bounds, 2), scene.robot.laser_pose
 
     def ends():
         begin, angle = rng.uniform(low, high), rng.integers(4) * np.pi / 2
@@ -203,7 +203,8 @@ def straight_near(rng, how=TOLD, length=2.5):
 
     def near(places):
         room = scene.room.distance(places) - SHOULDERS / 2
-        return room.min() > 0 and room.max() < NEAR
+        before = (places - pose[:2]) @ (np.cos(pose[2]), np.sin(pose[2]))
+        return room.min() > 0 and room.max() < NEAR and before.min() > 0.5
 
     def straight():
         return scene, walk(drawn(ends, near), scene, rng, **gait_of(how))
@@ -231,10 +232,10 @@ def acceptance(seed, draws=10):
     Returns
     -------
     dict of float
-        `cones_apart`: four cones with 0.6 m round each; `slaloms_kept`: of these, a slalom that keeps
-        0.30 m from the background. `cans_apart`: two cans with 1 m round each. `eights_kept`: one can
-        moved, and room for three figure-eights that keep 0.30 m. `poses_free`: a robot can stand
-        anywhere and go to the middle.
+        `cones_apart`: four cones with 0.6 m round each; `slaloms_kept`: of these, a slalom that
+        keeps 0.30 m from the background. `cans_apart`: two cans with 1 m round each. `eights_kept`:
+        one can moved, and room for three figure-eights that keep 0.30 m. `poses_free`: a robot can
+        stand there and go to the middle.
     """
     rng, can, cones = np.random.default_rng([seed, 22]), figure_eight_scene(), slalom_scene()
 
@@ -290,7 +291,7 @@ class Counting(np.random.Generator):
 
 
 def poses_free(rng, count):
-    """Share of poses anywhere on the map from which a robot can go to the middle of the laboratory."""
+    """Share of poses anywhere from which a robot can go to the middle of the laboratory."""
     counting, scene = Counting(rng.bit_generator), figure_eight_scene()
     obstacles = ObstacleMap.of(Environment(scene.boxes), recordings.background_map())
     free_poses(count, obstacles, scene.positions.mean(axis=0), counting)
