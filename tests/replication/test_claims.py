@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -166,8 +167,8 @@ def test_claims_of_section_v_learn_as_the_paper_does(id, monkeypatch):
     whole = CLAIMS[id].experiment(0)
     learned = learning.slaloms
 
-    def as_paper(seed, method="paper"):
-        return learned(seed, "paper")
+    def as_paper(seed, how):
+        return learned(seed, replace(how, learning="paper"))
 
     monkeypatch.setattr(learning, "slaloms", as_paper)
     alone = CLAIMS[id].experiment(0)
