@@ -668,7 +668,7 @@ def settings(seed, how=TOLD):
     }
 
 
-DATA = "log background observation demonstrations environment task robot self".split()
+DATA = ["log", "background", "observation", "demonstrations", "environment", "task", "robot", "self"]
 
 
 def settings_counted(calls=(observe, Demonstration.of, learn, Task.adapt, perform)):
