@@ -446,7 +446,8 @@ def single(seed, how=TOLD):
     primitive of the shown walks (movement_primitives), which is told where the way begins and ends
     now, or the one scaling and shift that carries all objects best, whichever is nearer to these
     walks; the paper's law, its subgoals moved with the objects; and the same method trained on as
-    many walks there. The DMP is stiff enough to follow the shown walk. Needed is retraining where
+    many walks there. The DMP is stiff enough to follow the shown walk; a figure-eight ends where it
+    begins, which tells no scale, so that it is told the scale. Needed is retraining where
     the error is more by a centimetre, a fifth of a cell; not needed where it is more by the paper's
     own 20 mm at most. Nothing where not all objects are matched with confidence.
     """
