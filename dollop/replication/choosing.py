@@ -175,10 +175,7 @@ def law_of(walks, how=TOLD, sample_period=0.1):
 
 
 def simple_law(walks, how, sample_period):
-    """A law without what is beyond the paper: neither rounded at subgoals nor with pauses.
-
-    Laps are laid together and cut as chosen.
-    """
+    """A law of walks laid together and cut as chosen, not divided anew where rounding bends it, without pauses."""
     count = CANDIDATES if how.cuts == "largest" else 100
     if how.laid == "even":
         aligned = np.stack([resample(walk, 2 * count - 1) for walk in walks])
@@ -190,8 +187,11 @@ def simple_law(walks, how, sample_period):
     path = aligned.mean(axis=0)[::2]
     cuts = chosen_cuts(path, statistics, how)
     found = statistics(cuts[:-1], np.diff(cuts))
-    segments = map(LDS, map(Statistics, found.G0, found.G1), path[cuts[1:]])
-    return SequencedLDS(tuple(segments), path[0], speeds_between(walks, moments[:, cuts], sample_period))
+    segments, at = tuple(map(LDS, map(Statistics, found.G0, found.G1), path[cuts[1:]])), moments[:, cuts]
+    law = SequencedLDS(segments, path[0], speeds_between(walks, at, sample_period))
+    pauses, corners = np.zeros(len(segments) + 1), np.zeros(len(segments), bool)
+    lengths = [line.way[-1] for line in law.lines()]
+    return law.with_timing(walks, at, sample_period, pauses, corners, lengths)
 
 
 def chosen_cuts(path, statistics, how):
