@@ -125,35 +125,35 @@ def combined_drawn(seed, n=5):
     "This merging process gives an increasingly accurate estimate about where the user intended "
     "the subgoals to be located.",
     Criterion("one_more_than_five_m", "off the intended way: one walk minus five [m]", NEARER, 0.01),
+    Criterion("passing_alone_more_m", "two layouts: one slalom minus two [m]", NEARER, 0.01),
     Criterion("off_1_m", "subgoals of one walk, off the intended way [m]"),
-    Criterion("off_2_m", "merged from two [m]"),
-    Criterion("off_5_m", "merged from five [m]"),
+    Criterion("off_2_m", "subgoals merged from two [m]"),
+    Criterion("off_5_m", "subgoals merged from five [m]"),
     Criterion("sixth_off_1_m", "a sixth walk, off the law of one [m]"),
-    Criterion("sixth_off_5_m", "off the law of five [m]"),
-    Criterion("passing_alone_more_m", "two layouts: off passing places, one slalom minus two [m]"),
-    Criterion("passing_alone_more_ours_m", "the same, ours [m]"),
+    Criterion("sixth_off_5_m", "a sixth walk, off the law of five [m]"),
+    Criterion("passing_alone_more_ours_m", "two layouts, ours: one slalom minus two [m]"),
     Criterion("drawn_two_more_than_ten_m", "drawn: error from two minus from ten [m]"),
     Criterion("drawn_exponent", "drawn: exponent in their number (ideal: -0.5)"),
     Criterion("drawn_error_2_m", "drawn: mean error of the subgoals from two [m]"),
-    Criterion("drawn_error_10_m", "drawn: from ten [m]"),
+    Criterion("drawn_error_10_m", "drawn: mean error from ten [m]"),
     Criterion("half_two_more_than_ten_m", "drawn, half as wide: two minus ten [m]"),
-    Criterion("half_right", "and share with the right number from ten", trials=1),
+    Criterion("half_right", "drawn, half as wide: share of right number from ten", trials=1),
     Criterion("twice_two_more_than_ten_m", "drawn, twice as wide: two minus ten [m]"),
-    Criterion("twice_right", "and share with the right number from ten", trials=1),
+    Criterion("twice_right", "drawn, twice as wide: share of right number from ten", trials=1),
     Criterion("tails_two_more_than_ten_m", "drawn, heavy tails: two minus ten [m]"),
-    Criterion("tails_right", "and share with the right number from ten", trials=1),
-    choices=(*WALKS, "merging", "spread"),
+    Criterion("tails_right", "drawn, heavy tails: share of right number from ten", trials=1),
+    choices=LEARNED,
 )
 def subgoals(seed, how=TOLD):
     """How far subgoals of one walk, and merged from two and five, are from where they were meant.
 
     The walks of `combined`. The walker means to pass each cone 0.75 m from its centre, left and
     right in turn: the mean distance of the subgoals to the smooth way through these places, without
-    his errors; where along it they are meant to be nobody knows. A centimetre matters, half of the
-    tolerance. A sixth walk: its mean distance to the law. Two layouts: the law adapted to a third,
-    off the passing places there. Drawn: error of six subgoals that scatter by 0.15 m along each
-    axis, half or twice as wide, or by Student's t of three degrees of freedom, one more in 30 %;
-    where their number is right.
+    his errors; where along it they are meant to be nobody knows. Two layouts: the mean distance of
+    the passing places in a third to the law adapted to it, of one slalom minus of two. A centimetre
+    matters, half of the tolerance. A sixth walk: its mean distance to the law. Drawn: error of six
+    subgoals that scatter by 0.15 m along each axis, half or twice as wide, or by Student's t of
+    three degrees of freedom, one more in 30 %; where their number is right.
     """
     if not subgoals_again(seed, how):
         return unknown("subgoals") | subgoals_drawn(seed)
