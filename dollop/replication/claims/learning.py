@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import combinations
 from math import nan
+from operator import attrgetter
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,7 +31,6 @@ from dollop.replication.claims.walked import (
     exponent,
     intended_places,
     intended_way,
-    law_shown,
     laws_of,
     walks_again,
 )
@@ -96,7 +96,7 @@ def combined(seed, how=TOLD):
 def subgoals_again(seed, how):
     """Subgoals (K, 2) in m of each walk of one person in one layout; none if one cannot be cut."""
     walks = [each.demonstration for each in walks_again(seed, how.only(WALKS))]
-    return [law.subgoals for law in laws_of(walks, law_shown)]
+    return [law.subgoals for law in laws_of(walks, attrgetter("law"))]
 
 
 def path_right(model):

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 from math import inf, nan
+from operator import attrgetter
 
 import numpy as np
 
@@ -30,7 +31,6 @@ from dollop.replication.claims.walked import (
     acceptance,
     eight_near,
     exponent,
-    law_shown,
     laws_of,
     straight_near,
     walks_again,
@@ -90,7 +90,7 @@ def repeatable(seed, how=TOLD):
         [each.walk.positions[::5] for each in again],
     )
     laps = recordings.figure_eights(seed, how.only(WALKS)).laps
-    numbers = cuts_apart([each.walks[0] for each in seen], laws_of(seen, law_shown))
+    numbers = cuts_apart([each.walks[0] for each in seen], laws_of(seen, attrgetter("law")))
     for name, walks in (("_unseen", unseen), ("_laps", laps)):
         laws = laws_of(walks, lambda walk: law_of([walk], how.only(WALKS)))
         numbers |= cuts_apart(walks, laws, name)
@@ -169,7 +169,7 @@ def layouts(seed, how=TOLD):
     """
     slaloms = [recordings.slalom(k, seed, how.only(WALKS)) for k in range(LAYOUTS + 1)]
     *shown, kept = [each.demonstration for each in slaloms]
-    if not laws_of(shown, law_shown):
+    if not laws_of(shown, attrgetter("law")):
         return unknown("layouts")
     numbers, ours = {}, replace(how, learning="anchored")
     for name, chosen, counts in (

@@ -24,7 +24,7 @@ from dollop.robot.avoidance import ObstacleMap
 
 __all__ = [
     "LEARNED", "NEARER", "WALKS", "acceptance", "eight_near", "exponent", "intended_places", "intended_way",
-    "law_shown", "laws_of", "straight_near", "walks_again",
+    "laws_of", "straight_near", "walks_again",
 ]  # fmt: skip
 
 NEARER = (0.01, inf)
@@ -91,20 +91,6 @@ def laws_of(walks, law):
         return [law(each) for each in walks]
     except ValueError:
         return []
-
-
-def law_shown(demonstration):
-    """The law of a demonstration.
-
-    Parameters
-    ----------
-    demonstration : Demonstration
-
-    Returns
-    -------
-    SequencedLDS
-    """
-    return demonstration.law
 
 
 def exponent(errors):
