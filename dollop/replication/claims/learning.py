@@ -51,8 +51,8 @@ SPREAD = TOLD.spread
     "V",
     "If the algorithm finds statistical similarities between the subgoals of different "
     "demonstrations, then the CDHMM is simplified by combining the similarities.",
-    Criterion("path_right", "share of paths as long as the walk in the middle", MOSTLY, 0.05, trials=1),
-    Criterion("states_right", "share of CDHMMs of as many states as needed", MOSTLY, 0.05, trials=1),
+    Criterion("path_right", "share of paths as long as a usual walk", MOSTLY, 0.05, trials=1),
+    Criterion("states_right", "share of CDHMMs with the states needed", MOSTLY, 0.05, trials=1),
     Criterion("states_more", "number of states beyond those needed"),
     Criterion("share_left", "states, share of the subgoals merged"),
     Criterion("pairs_right", "pairs of walks: share of CDHMMs of no more states than needed"),
@@ -124,7 +124,7 @@ def combined_drawn(seed, n=5):
     "V",
     "This merging process gives an increasingly accurate estimate about where the user intended "
     "the subgoals to be located.",
-    Criterion("one_more_than_five_m", "off the intended way: one walk minus five [m]", NEARER, 0.01),
+    Criterion("one_more_than_five_m", "off the intended way: one minus five [m]", NEARER, 0.01),
     Criterion("passing_alone_more_m", "two layouts: one slalom minus two [m]", NEARER, 0.01),
     Criterion("off_1_m", "subgoals of one walk, off the intended way [m]"),
     Criterion("off_2_m", "subgoals merged from two [m]"),

@@ -23,8 +23,8 @@ from dollop.replication.runs import free_poses
 from dollop.robot.avoidance import ObstacleMap
 
 __all__ = [
-    "LEARNED", "NEARER", "WALKS", "acceptance", "eight_near", "exponent", "intended_places", "intended_way",
-    "laws_of", "straight_near", "walks_again",
+    "LEARNED", "NEARER", "WALKS", "acceptance", "eight_near", "exponent", "intended_places",
+    "intended_way", "laws_of", "straight_near", "walks_again",
 ]  # fmt: skip
 
 NEARER = (0.01, inf)
