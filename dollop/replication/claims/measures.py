@@ -9,6 +9,7 @@ import numpy as np
 from dollop.replication import recordings
 from dollop.replication.choosing import following_of
 from dollop.replication.reconstruction import TOLD
+from dollop.robot.guidance import PIONEER_LIMITS
 from dollop.robot.performing import Unicycle, perform
 from dollop.trajectory import arc_length, distance_to_polyline
 
@@ -153,7 +154,7 @@ def clear_of(law, scene, method="paper"):
     return apart.min()
 
 
-def plain_run(task, start, how=TOLD, **choices):
+def plain_run(task, start, how=TOLD, limits=PIONEER_LIMITS, **choices):
     """A run under the paper's law, which knows no obstacles, of a robot that knows where it is.
 
     Parameters
@@ -162,6 +163,8 @@ def plain_run(task, start, how=TOLD, **choices):
     start : (3,) sequence of float
         Pose in m and rad.
     how : Reconstruction, optional
+    limits : Limits
+        What the robot can do.
     **choices
         More of what `dollop.perform` takes.
 
@@ -169,6 +172,6 @@ def plain_run(task, start, how=TOLD, **choices):
     -------
     Run
     """
-    robot, grid = Unicycle(start), recordings.background_map()
+    robot, grid = Unicycle(start, limits), recordings.background_map()
     choices = {"following": following_of(how), **choices}
     return perform(task, robot, control="plain", avoid=False, background=grid, **choices)
