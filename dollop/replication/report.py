@@ -20,8 +20,8 @@ from dollop.replication.judging import LEVEL, at_edge, interval, met, verdict
 from dollop.replication.running import REPORT, as_json, put_between_marks, report_beside
 
 __all__ = [
-    "GOLDEN", "claims_page", "golden_numbers", "measured", "publish", "quoted", "summaries",
-    "verdicts_table", "with_numbers",
+    "GOLDEN", "claims_page", "golden_numbers", "measured", "publish", "quoted", "stale", "summaries",
+    "told_anew", "first_verdicts", "verdicts_table", "with_numbers",
 ]  # fmt: skip
 
 VERDICTS = Kind("verdicts of claims", rb'\A\[\s*(\]|\{\s*"id":)')
@@ -322,6 +322,38 @@ def as_exact(mean, was):
     if value < 0 and not was.startswith("-"):  # "5 mm nearer": the words say which way
         value = -value
     return f"{value:,.{len(decimals or '')}f}{unit}"
+
+
+def stale(text, root):
+    """The numbers that a text quotes out of files, `[59](figures/metrics.json "08/margin")`, and are others there.
+
+    Parameters
+    ----------
+    text : str
+    root : Path
+        The folder that the files' paths begin in.
+
+    Returns
+    -------
+    list of (str, str, str)
+        File, way to the number in it, and the link as it should stand.
+
+    Raises
+    ------
+    KeyError
+        There is no such number.
+    """
+    found = []
+    for was, name, way in REFERRED.findall(text):
+        value = json.loads((root / name).read_text())
+        for key in way.split("/"):
+            value = value[int(key) if isinstance(value, list) else key]
+        if (now := as_exact(value, was)) != was:
+            found.append((name, way, now))
+    return found
+
+
+REFERRED = re.compile(r'\[([^\]]+)\]\(((?:study|figures)/\w+\.json) "([^"]+)"\)')
 
 
 # ---- writing it all

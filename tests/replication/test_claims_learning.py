@@ -76,6 +76,19 @@ def test_pairs_with_as_many_lds_are_counted():
     assert premises.cuts_apart([LINE] * 3, laws, "_x")["same_number_x"] == pytest.approx(1 / 3)
 
 
+def test_where_a_walk_cannot_be_cut_there_is_no_number():
+    """One walk that cannot be cut leaves no law, and all that is told of them is nan."""
+
+    def law(walk):
+        if walk == "jagged":
+            raise ValueError("tolerance cannot be kept")
+        return walk
+
+    assert walked.laws_of(["smooth", "even"], law) == ["smooth", "even"]
+    assert walked.laws_of(["smooth", "jagged"], law) == []
+    assert all(np.isnan(value) for value in premises.cuts_apart([LINE], []).values())
+
+
 # ---- the same walk again and again
 
 
@@ -92,7 +105,7 @@ def unmoved(monkeypatch):
         monkeypatch.setattr(module, "walks_again", again)
     laps = SimpleNamespace(laps=shown.demonstration.walks * 2)
     monkeypatch.setattr(recordings, "figure_eights", lambda seed, how: laps)
-    return asked
+    return SimpleNamespace(shown=shown, asked=asked)
 
 
 def test_who_walks_exactly_alike_is_cut_alike(unmoved):
@@ -118,10 +131,20 @@ def test_who_walks_exactly_alike_shows_one_task(unmoved):
     assert found["share_left"] == pytest.approx(1 / 5)
 
 
+def test_a_task_of_which_a_walk_cannot_be_cut_is_told_as_nan(unmoved):
+    """At a tolerance that no walk keeps nothing is judged; what was drawn is told all the same."""
+    unmoved.shown.demonstration = replace(unmoved.shown.demonstration, tolerance=1e-5)
+    for experiment in (learning.combined, learning.subgoals):
+        found = experiment(0)
+        for criterion in CLAIMS[experiment.__name__].criteria:
+            told = criterion.number.startswith(("drawn", "half", "twice", "tails"))
+            assert np.isfinite(found[criterion.number]) == told, criterion.number
+
+
 def test_no_other_choice_reaches_the_walks(unmoved):
     """What a walk does not depend on is taken as told, so that recordings are shared."""
     learning.combined(0, Reconstruction(gain=2.0, weights=1.0, learning="anchored"))
-    assert set(unmoved) == {TOLD}
+    assert set(unmoved.asked) == {TOLD}
 
 
 def test_states_beyond_those_needed():

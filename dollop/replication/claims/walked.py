@@ -23,8 +23,8 @@ from dollop.replication.runs import free_poses
 from dollop.robot.avoidance import ObstacleMap
 
 __all__ = [
-    "LEARNED", "NEARER", "WALKS", "acceptance", "eight_near", "exponent", "intended_places", "intended_way",
-    "straight_near", "walks_again",
+    "LEARNED", "NEARER", "WALKS", "acceptance", "eight_near", "exponent", "intended_places",
+    "intended_way", "laws_of", "straight_near", "walks_again",
 ]  # fmt: skip
 
 NEARER = (0.01, inf)
@@ -70,6 +70,27 @@ def seen_again(seed, how, count=5):
         return lab.slalom(first.scene, rng, **recordings.KEPT, **gait_of(how))
 
     return [replace(first, walk=drawn(again), noise=[seed, 21, k]) for k in range(count)]
+
+
+def laws_of(walks, law):
+    """The law of each walk alone.
+
+    Parameters
+    ----------
+    walks : sequence
+        Of whatever a law can be made of.
+    law : callable
+        From one of them to its SequencedLDS.
+
+    Returns
+    -------
+    list of SequencedLDS
+        Empty where a walk cannot be cut within the tolerance.
+    """
+    try:
+        return [law(each) for each in walks]
+    except ValueError:
+        return []
 
 
 def exponent(errors):
