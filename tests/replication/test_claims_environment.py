@@ -203,8 +203,31 @@ def test_found_and_false_objects_are_counted():
     bodies = np.array([[[0.0, 0.0], [3.0, 0.0], [6.0, 0.0]]] * 2)
     in_sight = np.array([[True, True, False], [False, True, True]])
     objects = [np.array([[0.1, 0.1], [3.0, 0.2]]), np.array([[6.1, 0.0], [8.0, 8.0]])]
-    room = foreground.RoomWalked(None, None, None, bodies, in_sight, 1)
+    room = foreground.RoomStoodIn(None, None, None, bodies, in_sight, 1)
     assert foreground.found_share(room, objects) == 0.75
     assert foreground.found_share(room, objects, slice(0, 1)) == 1
     assert foreground.false_share(room, objects) == 0.5
     assert np.isnan(foreground.found_share(room, [np.zeros((0, 2))] * 2, slice(0, 0)))
+
+
+def test_people_stand_where_there_is_room_and_beams_meet_what_they_meet():
+    """Readings on the walker are on their torso, those on the background are not; shoulders are clear of cans."""
+    room = foreground.room_stood_in(2000, count=8)
+    assert room.points.shape[:2] == room.on_walker.shape and room.draws >= 1
+    assert not (room.on_walker & room.on_background).any()
+    for points, on, away, bodies in zip(room.points, room.on_walker, room.on_background, room.bodies, strict=True):
+        apart = np.linalg.norm(points - bodies[0], axis=1)
+        assert (apart[on] < 0.3).mean() > 0.7 or not on.any()  # but for mixed readings
+        assert np.quantile(apart[away], 0.05) > 0.2
+        assert np.linalg.norm(bodies[1:] - bodies[0], axis=1).min() > foreground.CAN.radius + foreground.SHOULDERS / 2
+
+
+def test_a_body_is_in_sight_by_half_of_its_beams():
+    """Of four beams that would meet the walker two must; a can that no beam would meet is not."""
+    beams = np.full((1, 6, 4), inf)
+    beams[0, :, 3] = 5.0
+    beams[0, :4, 0] = [2.0, 2.0, 2.0, 6.0]
+    beams[0, 2:4, 1] = 1.0
+    assert foreground.half_seen(beams).tolist() == [[True, True, False]]
+    beams[0, 1, 1] = 1.0
+    assert foreground.half_seen(beams).tolist() == [[False, True, False]]

@@ -328,10 +328,9 @@ def test_what_is_counted_is_what_the_slaloms_are_drawn_by():
 
 def test_one_can_is_moved_as_where_laws_are_compared(monkeypatch):
     """The layouts with a can elsewhere are those of `single`."""
-    monkeypatch.setattr(lab, "watch", lambda *inputs, **choices: SimpleNamespace(log=None))
-    monkeypatch.setattr(recordings, "background_map", lambda: None)
-    monkeypatch.setattr(environment, "observe", lambda *inputs, **choices: SimpleNamespace(environment=None))
-    _, scene, _ = environment.one_can_moved(4)
+    monkeypatch.setattr(recordings, "figure_eights", lambda *_: SimpleNamespace(demonstration=None))
+    monkeypatch.setattr(environment, "elsewhere", lambda shown, drawn, *_: drawn[0])
+    scene = environment.can_moved.__wrapped__(4)
     layouts = [tried for k in range(10) if (tried := can_elsewhere([4, 17, k])) is not None]
     assert any(np.array_equal(scene.positions, each) for each in layouts)
 

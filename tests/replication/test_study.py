@@ -195,7 +195,7 @@ def test_the_command_writes_table_and_claims(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["nonsense"], "no claim nonsense; known: single, filter, centroid"),
+        (["nonsense"], "no claim nonsense; known: single, settings, alike"),
         (["combined", "--seeds", "1"], "an interval needs at least 2 seeds, from 0 on, got 1 from 1000 on"),
     ],
 )
