@@ -34,12 +34,18 @@ from dollop.tracking import Motion, Tracker
 from dollop.trajectory import align, arc_length, distance_to_polyline, resample
 
 __all__ = [
-    "LAWS", "TIES", "ShownAs", "adapted", "as_paper", "following_of", "gait_of", "law_of", "learned",
-    "model_of", "motion_of", "response_of", "seen_by", "shown_as", "task_of",
+    "LAWS", "SEEN", "SHOWN_LAW", "TIES", "ShownAs", "adapted", "as_paper", "following_of", "gait_of",
+    "law_of", "learned", "model_of", "motion_of", "response_of", "seen_by", "shown_as", "task_of",
 ]  # fmt: skip
 
 LAWS = ("lds", "tolerance", "cuts", "laid")
 """Fields on which a law depends."""
+
+SEEN = ("laser_noise", "walker")
+"""Fields on which a recording depends."""
+
+SHOWN_LAW = (*LAWS, *SEEN)
+"""Fields on which a law depends that was fitted to what the laser saw."""
 
 TIES = ("weights", "corners")
 """Fields on which it depends where subgoals go when objects move."""
@@ -169,7 +175,11 @@ def law_of(walks, how=TOLD, sample_period=0.1):
     if how.laid == TOLD.laid and how.cuts != "largest":
         exactly = 6 if how.cuts == "six" else None
         return SequencedLDS.fit(
-            walks, how.tolerance, exactly, retimed=how.lds == "re-timed", sample_period=sample_period
+            walks,
+            how.tolerance,
+            exactly,
+            retimed=how.lds == "re-timed",
+            sample_period=sample_period,
         )
     return simple_law([np.asarray(walk, float) for walk in walks], how, sample_period)
 
@@ -187,7 +197,10 @@ def simple_law(walks, how, sample_period):
     path = aligned.mean(axis=0)[::2]
     cuts = chosen_cuts(path, statistics, how)
     found = statistics(cuts[:-1], np.diff(cuts))
-    segments, at = tuple(map(LDS, map(Statistics, found.G0, found.G1), path[cuts[1:]])), moments[:, cuts]
+    segments, at = (
+        tuple(map(LDS, map(Statistics, found.G0, found.G1), path[cuts[1:]])),
+        moments[:, cuts],
+    )
     law = SequencedLDS(segments, path[0], speeds_between(walks, at, sample_period))
     pauses, corners = np.zeros(len(segments) + 1), np.zeros(len(segments), bool)
     lengths = [line.way[-1] for line in law.lines()]
@@ -396,7 +409,10 @@ def learned_as_paper(demonstrations, how):
     model = model_of([law.subgoals for law in laws], how)
     members = members_along(model)
     tied = reweighed(tied_to_all(used, environment, members), how)
-    law, notes = shared_law(laws, members, tied.relocate(environment)), (*notes_of(demonstrations), *aside)
+    law, notes = (
+        shared_law(laws, members, tied.relocate(environment)),
+        (*notes_of(demonstrations), *aside),
+    )
     return Task(law, environment, tied, model, demonstrations, notes, partners=partners)
 
 
