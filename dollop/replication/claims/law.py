@@ -5,7 +5,7 @@ shown, is told beside it.
 """
 
 from dataclasses import replace
-from math import inf, nan
+from math import inf
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from dollop.lds import LDS
 from dollop.pose import wrapped
 from dollop.replication import recordings
 from dollop.replication.choosing import SHOWN_LAW, law_of
-from dollop.replication.claims.claim import MOSTLY, Criterion, claim
+from dollop.replication.claims.claim import MOSTLY, Criterion, claim, unknown
 from dollop.replication.claims.measures import (
     SHARES,
     clear_of,
@@ -273,17 +273,18 @@ def segments(seed, how=TOLD):
     """
     shown = recordings.figure_eights(seed, how)
     walks, law = shown.laps, shown.task.law
+    mean = mean_trajectory(walks)
     numbers = {
         "n_segments": float(len(law.segments)),
-        "n_at_10_mm": float(len(law_of(walks, replace(how, tolerance=0.010)).segments)),
-        "n_at_40_mm": float(len(law_of(walks, replace(how, tolerance=0.040)).segments)),
-        "error_m": error_of(law, [mean_trajectory(walks)]),
+        "error_m": error_of(law, [mean]),
         "error_laps_m": error_of(law, walks),
-        "error_ours_m": error_of(law, [mean_trajectory(walks)], "held"),
+        "error_ours_m": error_of(law, [mean], "held"),
     }
-    for name, eights in EIGHTS.items():
-        numbers[f"n_{name}"] = float(len(law_of(walked_eights(seed, **eights)).segments)) if how == TOLD else nan
-    return numbers
+    if how != TOLD:
+        return unknown("segments") | numbers
+    told = {name: law_of(walked_eights(seed, **eights)) for name, eights in EIGHTS.items()}
+    told |= {f"at_{mm}_mm": law_of(walks, replace(how, tolerance=mm / 1000)) for mm in (10, 40)}
+    return numbers | {f"n_{name}": float(len(each.segments)) for name, each in told.items()}
 
 
 EIGHTS = {
