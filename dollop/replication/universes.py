@@ -1,14 +1,14 @@
-"""A replication of many universes: what each claim's verdict would be had something else been chosen.
+"""A replication of many universes: what each verdict would be had something else been chosen.
 
-A universe is a `Reconstruction`. The first is the one that is told; then each alternative comes alone;
-then combinations drawn at random, in which every level of a choice is as frequent as any other. A claim
-runs once for all universes that do not differ in what it depends on. Results go into one table,
-study/universes.csv, as those of the study do (`dollop.replication.study`).
+A universe is a `Reconstruction`. The first is the one that is told; then each alternative comes
+alone; then combinations drawn at random, in which every level of a choice is as frequent as any
+other. A claim runs once for all universes that do not differ in what it depends on. Results go into
+one table, study/universes.csv, as those of the study do (`dollop.replication.study`).
 
 A verdict in a universe is that of the means: a number is as the claim wants it if the mean over the
-seeds lies in its range. Intervals of ten seeds would be open nearly everywhere, and tell of the number of
-seeds and not of the universe. So a verdict can change by chance alone; how often it does is told beside
-it, from draws of as many seeds out of those of the study.
+seeds lies in its range. Intervals of ten seeds would be open nearly everywhere, and tell of the
+number of seeds and not of the universe. So a verdict can change by chance alone; how often it does
+is told beside it, from draws of as many seeds out of those of the study.
 """
 
 import csv
@@ -79,9 +79,10 @@ def universes(count=COUNT):
 def combined(count):
     """So many combinations, every level of a choice in as many as any other, but for one."""
     rng = np.random.default_rng(SEED)
-    columns = {name: rng.permutation(np.resize(np.arange(len(levels)), count)) for name, levels in LEVELS.items()}
-    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
-    return [Reconstruction(**{name: LEVELS[name][k] for name, k in row.items()}) for row in rows]
+    orders = [rng.permutation(np.resize(np.arange(len(each)), count)) for each in LEVELS.values()]
+    pairs = zip(LEVELS.values(), orders, strict=True)
+    rows = zip(*(map(levels.__getitem__, order) for levels, order in pairs), strict=True)
+    return [Reconstruction(**dict(zip(LEVELS, row, strict=True))) for row in rows]
 
 
 def name_of(how):
@@ -169,7 +170,7 @@ def choosy(claims):
 
 
 def jobs_of(claims, hows, seeds):
-    """The jobs of a study, (claim, universe, seed), those of a seed so that neighbours share the most."""
+    """The jobs of a study, (claim, universe, seed), so ordered that neighbours share the most."""
     names = (*ORDER, *(each.name for each in fields(TOLD) if each.name not in ORDER))
     pairs = {(how.only(claim.choices), id) for id, claim in claims.items() for how in hows}
     places = list(claims)
@@ -326,9 +327,9 @@ def summary(rows, hows, claims=CLAIMS, results=None):
 def of_claim(claim, hows, verdicts):
     """What the verdicts (N,) of a claim in N universes tell.
 
-    The verdict as told and how often there is any; the share that is the same; in how many different
-    universes it was tried; for each other level of a choice the share with it that is the same, that
-    share as told minus it, and whether it alone flips the verdict.
+    The verdict as told and how often there is any; the share that is the same; in how many
+    different universes it was tried; for each other level of a choice the share with it that is the
+    same, that share as told minus it, and the verdict if it alone flips it.
     """
     same = np.array([each == verdicts[0] for each in verdicts])
     choices = {}
@@ -338,10 +339,11 @@ def of_claim(claim, hows, verdicts):
         for k, level in enumerate(LEVELS[name][1:], start=1):
             here, alone = same[levels == k], replace(TOLD, **{name: level})
             share = float(here.mean()) if len(here) else nan
+            found = verdicts[hows.index(alone)] if alone in hows else verdicts[0]
             choices.setdefault(name, {})[str(level)] = {
                 "same": short(share),
                 "lowers": short(usual - share),
-                "flips": verdicts[hows.index(alone)] if alone in hows and not same[hows.index(alone)] else None,
+                "flips": None if found == verdicts[0] else found,
             }
     return {
         "verdict": verdicts[0],
@@ -367,14 +369,17 @@ def study_numbers(path):
 
 
 def by_chance(claim, numbers, count):
-    """Share of draws of so many seeds' numbers with the verdict of all; None where there are too few."""
+    """Share of draws of so many seeds with the verdict of all; None where there are too few."""
     names = {each.number for each in judged(claim)}
     numbers = [each for each in numbers if names <= set(each)]
     if len(numbers) < 2 * count or not count:
         return None
     rng, whole = np.random.default_rng(SEED), verdict_of(claim, numbers)
-    draws = (rng.choice(len(numbers), count, replace=False) for _ in range(DRAWS))
-    return short(np.mean([verdict_of(claim, [numbers[k] for k in some]) == whole for some in draws]))
+    alike = 0
+    for _ in range(DRAWS):
+        some = [numbers[k] for k in rng.choice(len(numbers), count, replace=False)]
+        alike += verdict_of(claim, some) == whole
+    return short(alike / DRAWS)
 
 
 # ---- telling
@@ -406,12 +411,12 @@ def percent(share):
 
 def flipped_by(told):
     """Which choices flip a verdict alone, or else which lower the share of equal verdicts most."""
-    every = [(name, level, each) for name, levels in told["choices"].items() for level, each in levels.items()]
-    alone = [f"{name} {level}" for name, level, each in every if each["flips"]]
-    if alone:
-        return ", ".join(alone)
-    most = [(each["lowers"], name, level) for name, level, each in every if (each["lowers"] or 0) >= LOWERS]
-    return ", ".join(f"({name} {level})" for _, name, level in sorted(most, reverse=True)[:2])
+    every = []
+    for name, levels in told["choices"].items():
+        every += [(each["lowers"] or 0.0, f"{name} {level}", each["flips"]) for level, each in levels.items()]
+    alone = [level for _, level, flips in every if flips]
+    most = sorted((each for each in every if each[0] >= LOWERS), reverse=True)[:2]
+    return ", ".join(alone or [f"({level})" for _, level, _ in most])
 
 
 def draw_figure(found, path):
@@ -447,32 +452,29 @@ def draw_figure(found, path):
 
 
 def draw_grid(figure, ax, grid, names, found):
-    """The map: how much each choice lowers the share of equal verdicts; a dot where it flips one alone."""
+    """The map: how much each choice lowers the share; a dot where it flips a verdict alone."""
     ax.set_facecolor("0.93")
     image = ax.imshow(grid, cmap="cividis_r", vmin=0, vmax=1, aspect="auto")
-    ax.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], rotation=60, ha="right")
+    labels = [name.replace("_", " ") for name in names]
+    ax.set_xticks(range(len(names)), labels, rotation=60, ha="right")
     ax.set_yticks(range(len(grid)), list(found["claims"]))
     ax.tick_params(length=0)
     ax.grid(False)
     for row, told in enumerate(found["claims"].values()):
-        flips = [name for name, levels in told["choices"].items() if any(map(_flips, levels.values()))]
-        ax.plot(list(map(names.index, flips)), [row] * len(flips), "o", color="white", mec="black", ms=5)
-    figure.colorbar(image, ax=ax, location="top", shrink=0.6, label="lowers the share of equal verdicts by")
-
-
-def _flips(level):
-    return level["flips"] is not None
+        for name, levels in told["choices"].items():
+            if any(level["flips"] for level in levels.values()):
+                ax.plot(names.index(name), row, "o", color="white", mec="black", ms=5)
+    label = "lowers the share of equal verdicts by (dot: flips it alone)"
+    figure.colorbar(image, ax=ax, location="top", shrink=0.8, label=label)
 
 
 def draw_shares(ax, claims):
-    """Bars: the share of universes with the same verdict; a line where chance alone would have it."""
+    """Bars: the share of universes with the same verdict; a line where chance has it."""
     rows = range(len(claims))
     ax.barh(rows, [told["same"] for told in claims.values()], color="#0072b2", height=0.7)
-    chance = [(row, told["by_chance"]) for row, told in enumerate(claims.values()) if told["by_chance"]]
-    if chance:
-        at, share = zip(*chance, strict=True)
-        ax.plot(share, at, "|", color="#d55e00", ms=9, mew=2.5, label="by chance alone")
-        ax.legend(loc="lower left", bbox_to_anchor=(0, 1))
+    chance = [told["by_chance"] or nan for told in claims.values()]
+    ax.plot(chance, rows, "|", color="#d55e00", ms=9, mew=2.5, label="other seeds alone")
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1))
     ax.set_xlim(0, 1)
     ax.set_xlabel("share with the same verdict")
     ax.grid(False, axis="y")
@@ -487,7 +489,8 @@ def command(options):
     Parameters
     ----------
     options : argparse.Namespace
-        seeds (None for the usual number), first_seed, quick, folder (None for the usual one), scheduler.
+        seeds (None for the usual number), first_seed, quick, folder (None for the usual one),
+        scheduler.
 
     Raises
     ------
@@ -512,9 +515,10 @@ def command(options):
 
 
 def publish(found, folder, whole):
-    """Write the summary and the figure, and the table in REPLICATION.md if it tells of these universes."""
+    """Write the summary and the figure, and the table in REPLICATION.md if it has one."""
     for id, told in found["claims"].items():
-        print(f"{id:17}{told['verdict']:15}{percent(told['same']):>6} the same, by {flipped_by(told) or 'none'}")
+        same = f"{percent(told['same']):>6} the same"
+        print(f"{id:17}{told['verdict']:15}{same}, flipped by: {flipped_by(told) or 'none'}")
     written = [folder / "universes.csv", folder / "universes.json", folder / "universes.png"]
     report = report_beside(folder)
     with together():
