@@ -163,10 +163,10 @@ def _parser():
         "ids",
         nargs="*",
         metavar="claim",
-        help="which (default: all); an unknown one lists them; worlds: random worlds",
+        help="which (default: all); an unknown one lists them; criteria: freeze them; worlds: random worlds",
     )
-    add("--seeds", type=whole, help="how many (default: 100; 300 worlds)")
-    add("--first-seed", type=whole, default=0, metavar="N", help="of the worlds (default: 0)")
+    add("--seeds", type=whole, help="how many (default: 200; 300 worlds)")
+    add("--first-seed", type=whole, metavar="N", help="default: 1000; 0 for worlds")
     add("--quick", action="store_true", help="3 seeds, or 11 worlds, for a look")
     add("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
     add("--folder", type=Path, help="for the table (default: study; study-quick with --quick)")

@@ -132,12 +132,13 @@ def _in_time(walk):
     return np.stack([np.interp(at, np.arange(len(walk)), axis) for axis in walk.T], axis=1)
 
 
-def dmp(walks, ends):
+def dmp(walks, ends, scale=1.0, stiffness=25.0):
     """A dynamic movement primitive (movement_primitives), told where the way begins and ends.
 
     It has 50 weights and scales smoothly with its goal (Pastor et al. 2009). It imitates one path:
     the mean of the walks, or the walk whose ends are nearest to the wanted ones, whichever foretells
-    walks that are left out better.
+    walks that are left out better. A scale multiplies its weights: with ends that are scaled alike
+    the whole way is, also where it ends where it begins and its ends alone tell no scale.
 
     Parameters
     ----------
@@ -145,6 +146,11 @@ def dmp(walks, ends):
         In m.
     ends : (2, 2) array_like
         First and last place in m.
+    scale : float
+        Of the way between them.
+    stiffness : float
+        Of its spring and, critically, its damper: alpha_y. A path that begins at full speed it
+        follows late, the later the softer it is.
 
     Returns
     -------
@@ -160,8 +166,8 @@ def dmp(walks, ends):
     walks, ends = [_in_time(walk) for walk in walks], np.asarray(ends, float)
     choices = (_mean, _nearest)
     if len(walks) > 2:
-        choices = sorted(choices, key=lambda choice: _left_out(walks, choice))
-    return _imitated(choices[0](walks, ends), ends)
+        choices = sorted(choices, key=lambda choice: _left_out(walks, choice, stiffness))
+    return _imitated(choices[0](walks, ends), ends, scale, stiffness)
 
 
 def _mean(walks, ends):
@@ -172,21 +178,23 @@ def _nearest(walks, ends):
     return min(walks, key=lambda walk: np.linalg.norm(walk[[0, -1]] - ends))
 
 
-def _left_out(walks, choice):
+def _left_out(walks, choice, stiffness):
     """Mean distance of each walk, left out, to what is made of the others, in m."""
     errors = []
     for k, walk in enumerate(walks):
         ends = walk[[0, -1]]
-        made = _imitated(choice(walks[:k] + walks[k + 1 :], ends), ends)
+        made = _imitated(choice(walks[:k] + walks[k + 1 :], ends), ends, stiffness=stiffness)
         errors.append(np.linalg.norm(made - walk, axis=1).mean())
     return np.mean(errors)
 
 
-def _imitated(path, ends):
+def _imitated(path, ends, scale=1.0, stiffness=25.0):
     from movement_primitives.dmp import DMP
 
-    primitive = DMP(2, 1.0, dt=1 / (SAMPLES - 1), n_weights_per_dim=WEIGHTS, smooth_scaling=True)
+    springs = {"alpha_y": stiffness, "beta_y": stiffness / 4}
+    primitive = DMP(2, 1.0, 1 / (SAMPLES - 1), WEIGHTS, smooth_scaling=True, **springs)
     primitive.imitate(np.linspace(0, 1, SAMPLES), path)
+    primitive.set_weights(scale * primitive.get_weights())
     primitive.configure(start_y=ends[0], goal_y=ends[1])
     return primitive.open_loop(step_function="rk4")[1]  # not in Cython: it may be built without
 

@@ -530,12 +530,12 @@ def slalom(k, seed=SEED, how=TOLD):
     return _slalom(k, seed, how.only((*SEEN, *LAWS)))
 
 
-@lru_cache(maxsize=6)
+@lru_cache(maxsize=8)
 def _slalom(k, seed, how):
     return ChosenSlalom(_slalom_walked(k, seed, how.only(SEEN)), how)
 
 
-@lru_cache(maxsize=6)
+@lru_cache(maxsize=8)
 def _slalom_walked(k, seed, how):
     rng = np.random.default_rng([seed, 11, k])
     for _ in range(100):

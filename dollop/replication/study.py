@@ -1,57 +1,51 @@
 """The study behind REPLICATION.md: every claim over many seeds, on all cores or a Dask cluster.
 
-Results go into one table, study/results.csv: a line per claim and seed, with its numbers, the
-fingerprints of the code and of the criteria that made them, and a checksum. It is added to
-whenever an experiment is done, by as many studies at a time as there are, and an interrupted study
-goes on where it was. From the table come claims.json, and with it the table of claims in
-REPLICATION.md; and study/golden.json, the numbers of one seed that any machine must find again.
+What is asked of every claim is frozen first, in study/criteria.json. Results then go into one table,
+study/results.csv: a line per claim and seed, with its numbers, the fingerprints of the code that
+made them and of the criteria that judge them, and a checksum. It is added to whenever an experiment
+is done, by as many studies at a time as there are, and an interrupted study goes on where it was.
+Seeds that have judged a claim judge it under no other criteria. What follows from the table is
+written by `dollop.replication.report`.
 """
 
-import sys
+import json
+from dataclasses import asdict
 from functools import partial
 from itertools import chain
-from math import isfinite, isinf, nan
+from math import isfinite, isinf
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
-from scipy import stats
 
 from dollop.checks import need
 from dollop.formats.files import warn_of
 from dollop.formats.kinds import Kind
-from dollop.formats.writing import check_writable, together, whole_file
+from dollop.formats.writing import check_writable, whole_file
 from dollop.replication.claims import CLAIMS
 from dollop.replication.claims.observing import choose_noises
 from dollop.replication.fingerprint import fingerprint, fingerprint_of_text
+from dollop.replication.judging import FAMILY, LEVEL
 from dollop.replication.ledger import NOT_DONE, Ledger
-from dollop.replication.running import (
-    REPORT,
-    as_json,
-    going_on_in,
-    put_between_marks,
-    report_beside,
-    run_all,
-)
+from dollop.replication.report import publish
+from dollop.replication.running import as_json, going_on_in, report_beside, run_all
 from dollop.replication.worlds.survey import command as survey_worlds
 
-__all__ = ["command"]
+__all__ = ["command", "read_table"]
 
 COLUMNS = ["claim", "seed", "number", "value"]
 """Of the table in memory: a row for each number."""
 LINE = ("claim", "seed", "numbers", "code", "criteria")
 """Columns of the file; its lines hold all numbers of a claim and a seed, as name=value."""
-SEEDS, QUICK_SEEDS = 100, 3
+FIRST_SEED, SEEDS, QUICK_SEEDS = 1000, 200, 3
+"""Seeds of the study, which nobody had looked at when the criteria were frozen; those of a look."""
 
-VERDICTS = Kind("verdicts of claims", rb'\A\[\s*(\]|\{\s*"id":)')
-NUMBERS = Kind("golden numbers", rb'\A\{\s*"parameters":')
+FIRST = "results_first.csv"
+"""The table of the first study, seeds 0 to 99, whose criteria were changed since; beside the table."""
 
-GOLDEN = {"seed": 0, "tolerance": 0.01}
-"""The seed whose numbers any machine must find again, and within what: a share of a number's
-standard deviation over the seeds. What differs between processors is far below it (numpy without
-AVX and another kernel of the linear algebra left all six digits of the table as they were); a walk
-drawn anew is far above it, for fewer than one in a hundred would come that near by chance.
-"""
+FROZEN = "criteria.json"
+"""What every claim is judged by, beside the table."""
+
+CRITERIA = Kind("criteria of claims", rb'\A\{\s*"rule":')
 
 
 # ---- running
@@ -85,8 +79,7 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
     """Fill the table with what is missing in it, claim by claim of a seed.
 
     Numbers count that code of today has made, which has the same fingerprint; others are made anew.
-    They count as well if a criterion has been changed since, as long as all those are there that
-    are asked for: then that is said, for a criterion should stand before the numbers it judges.
+    A seed that has judged a claim under other criteria is refused.
 
     Parameters
     ----------
@@ -109,6 +102,8 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
 
     Raises
     ------
+    ValueError
+        If seeds have judged a claim under other criteria.
     RuntimeError
         If experiments failed or killed their workers, which are named; or if workers died whatever
         they were at. All that was finished is in the table.
@@ -116,35 +111,60 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
         If the file is something else.
     """
     stamps = {id: stamp(claim) for id, claim in claims.items()}
+    refuse_judged(ids, seeds, table_path, stamps)
 
     def answers(row):
-        made = stamps.get(row["claim"], {}).get("code") == row["code"]
+        made = all(row[key] == value for key, value in stamps.get(row["claim"], NEVER).items())
         return made and {each.number for each in claims[row["claim"]].criteria} <= set(numbers_of(row))
 
-    asked = [(id, str(seed)) for seed in seeds for id in ids]
     rows = run_all(
         ledger_at(table_path),
-        asked,
+        [(id, str(seed)) for seed in seeds for id in ids],
         answers,
         lambda job: stamps[job[0]],
         partial(work, claims=claims),
         scheduler,
         jobs,
     )
-    old = {row["claim"] for row in rows if answers(row) and row["criteria"] != stamps[row["claim"]]["criteria"]}
-    if old:
-        told = "numbers are older than the criteria that judge them now"
-        print(f"{told}, and are kept: {', '.join(sorted(old))}", file=sys.stderr)
-    return as_table(chain.from_iterable(map(expanded, rows)))
+    return as_table(chain.from_iterable(map(expanded, filter(answers, rows))))
+
+
+NEVER = {"code": None}
+"""The stamp of a claim that is none any more: no line has it."""
+
+
+def refuse_judged(ids, seeds, table_path, stamps):
+    """Refuse seeds that have judged one of these claims under other criteria, in this study or the first."""
+    rows = chain.from_iterable(ledger_at(path).read()[0] for path in (table_path, table_path.with_name(FIRST)))
+    asked = {(id, str(seed)) for id in ids for seed in seeds}
+    judged = [row for row in rows if (row["claim"], row["seed"]) in asked and numbers_of(row)]
+    other = [row for row in judged if row["criteria"] != stamps[row["claim"]]["criteria"]]
+    if other:
+        names, used = sorted({row["claim"] for row in other}), [int(row["seed"]) for row in other]
+        told = f"seeds {min(used)} to {max(used)} have judged {', '.join(names)} under other criteria"
+        raise ValueError(f"{told}; judge on seeds never used, such as --first-seed {max(used) + 1}")
 
 
 def stamp(claim):
-    """The fingerprints of the code and of the criteria that make a claim's numbers."""
-    criteria = ((each.number, each.wanted, each.trials, each.timed) for each in claim.criteria)
+    """The fingerprints of the code that makes a claim's numbers, and of what they are judged by."""
+    judged = asked_of(claim) | {"criteria": [each for each in asked_of(claim)["criteria"] if each["wanted"]]}
+    for each in judged["criteria"]:
+        del each["meaning"]
     return {
         "code": fingerprint(claim.experiment.__module__),
-        "criteria": fingerprint_of_text(*map(repr, criteria)),
+        "criteria": fingerprint_of_text(repr(judged), fingerprint(RULE)),
     }
+
+
+RULE = "dollop.replication.judging"
+
+
+def asked_of(claim):
+    """What is asked of a claim, as plain values for JSON; an end that is infinite is None."""
+    criteria = [asdict(each) for each in claim.criteria]
+    for each in criteria:
+        each["wanted"] = each["wanted"] and [end if isfinite(end) else None for end in each["wanted"]]
+    return {"section": claim.section, "quote": claim.quote, "criteria": criteria}
 
 
 def ledger_at(path):
@@ -179,168 +199,30 @@ def as_table(rows=()):
 
 
 def read_table(path):
-    """The table at a path, an empty one if there is none.
+    """The numbers in the table at a path that today's criteria judge; empty if there is no table.
 
     Lines that are damaged are left out, with a warning; of each claim and seed the last counts.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each claim, seed and number.
 
     Raises
     ------
     FormatError
         If the file is something else.
     """
-    ledger = ledger_at(path)
+    ledger, criteria = ledger_at(path), {id: stamp(claim)["criteria"] for id, claim in CLAIMS.items()}
     rows, damaged = ledger.read()
     if damaged:
         warn_of(path, f"{damaged} lines are damaged and left out")
-    return as_table(chain.from_iterable(map(expanded, ledger.latest(rows, numbers_of))))
-
-
-# ---- summing up
-
-
-def interval(values, share=False, level=0.95):
-    """Mean of values (N,) and its interval: Student's, or for a share Wilson's.
-
-    Examples
-    --------
-    >>> mean, low, high = interval([0, 1, 1, 1, 1, 1, 1, 1, 1, 1], share=True)
-    >>> f"{mean:.2f} [{low:.2f}, {high:.2f}]"
-    '0.90 [0.60, 0.98]'
-    """
-    values, n = np.asarray(values, float), len(values)
-    if not n:
-        return nan, nan, nan
-    mean = values.mean()
-    if share:
-        if not 0 <= values.min() <= values.max() <= 1:
-            raise ValueError(f"a share must be in 0 to 1, got {values.min():g} to {values.max():g}")
-        ends = stats.binomtest(int(values.sum()), n).proportion_ci(level, "wilson")
-        return mean, ends.low, ends.high
-    reach = stats.sem(values) * stats.t.ppf((1 + level) / 2, n - 1) if n > 1 else np.inf
-    return mean, mean - reach, mean + reach
-
-
-def summaries(table):
-    """Summaries of all claims in the table, in the paper's order."""
-    by_claim = dict(iter(table.groupby("claim")))
-    return [summary(claim, by_claim[id]) for id, claim in CLAIMS.items() if id in by_claim]
-
-
-def summary(claim, rows):
-    """One claim's numbers over the seeds, and its verdict, as plain values for JSON.
-
-    Parameters
-    ----------
-    claim : Claim
-    rows : pandas.DataFrame
-        Of the table, those of this claim.
-    """
-    values = [rows.value[rows.number == each.number].dropna() for each in claim.criteria]
-    numbers = [measured(*each) for each in zip(claim.criteria, values, strict=True)]
-    return {
-        "id": claim.id,
-        "section": claim.section,
-        "quote": claim.quote,
-        "experiment": " ".join(claim.experiment.__doc__.split()),
-        "seeds": int(rows.seed.nunique()),
-        "numbers": numbers,
-        "verdict": verdict([each["met"] for each in numbers if each["met"]]),
-        "by_construction": claim.constructed,
-    }
-
-
-def measured(criterion, values):
-    """One number over the seeds: mean, spread, interval, what is wanted and whether that is met."""
-    mean, low, high = interval(values, criterion.trials == 1)
-    wanted = criterion.wanted
-    return {
-        "number": criterion.number,
-        "meaning": criterion.meaning,
-        "mean": short(mean),
-        "sd": short(np.std(values, ddof=1) if len(values) > 1 else nan),
-        "low": short(low),
-        "high": short(high),
-        "seeds": len(values),
-        "wanted": wanted and [end if isfinite(end) else None for end in wanted],
-        "met": wanted and met(low, high, wanted),
-    }
-
-
-def short(value):
-    """A number to four significant digits, None for what is no number."""
-    return float(f"{value:.4g}") if isfinite(value) else None
-
-
-def met(low, high, wanted):
-    """Whether an interval lies in what is wanted: "yes", "no" if wholly beside it, else "open"."""
-    if wanted[0] < low and high <= wanted[1]:
-        return "yes"
-    return "no" if high <= wanted[0] or low > wanted[1] else "open"
-
-
-def verdict(answers):
-    """The rule: it holds if all are met, not if none is and one is clearly not, else in part."""
-    if all(answer == "yes" for answer in answers):
-        return "holds"
-    return "does not hold" if "no" in answers and "yes" not in answers else "holds in part"
-
-
-def golden_numbers(table):
-    """The golden seed's numbers but for times, each with its tolerance, by claim and number."""
-    values = table.pivot(index=["claim", "number"], columns="seed", values="value")
-    numbers = {}
-    for id, claim in CLAIMS.items():
-        for each in claim.criteria:
-            key = (id, each.number)
-            if key in values.index and not each.timed:
-                numbers.setdefault(id, {})[each.number] = golden(values.loc[key])
-    return {"parameters": GOLDEN, "numbers": numbers}
-
-
-def golden(values):
-    """The value of the golden seed, None for nan, and what another machine's may differ by.
-
-    The floor is for numbers without spread, and for the six digits that the table keeps.
-    """
-    value = values[GOLDEN["seed"]]
-    floor = 1e-9 + 1e-6 * np.nan_to_num(abs(value))
-    tolerance = max(floor, np.nan_to_num(GOLDEN["tolerance"] * values.std()))
-    return {"value": float(value) if isfinite(value) else None, "tolerance": short(tolerance)}
-
-
-# ---- telling
-
-
-def claims_table(found):
-    """The claims as a Markdown table: words, numbers with intervals, what is wanted, verdict."""
-    head = "| claim | Sec. | the paper's words | number: mean [95 % interval] | wanted | verdict |"
-    return "\n".join([head, "|" + "---|" * 6, *map(table_row, found)])
-
-
-def table_row(claim):
-    """One claim as a row of the Markdown table."""
-    numbers = "<br>".join(f"{n['meaning']}: {amount(n)}" for n in claim["numbers"])
-    wanted = "<br>".join(wish(n["wanted"]) for n in claim["numbers"])
-    verdict = f"**{claim['verdict']}**" + (", by construction" if claim["by_construction"] else "")
-    quote = f"“{claim['quote']}”"
-    return f"| `{claim['id']}` | {claim['section']} | {quote} | {numbers} | {wanted} | {verdict} |"
-
-
-def amount(number):
-    """A number with its interval."""
-    if number["low"] is None:
-        return "no interval"
-    return f"{number['mean']:.3g} [{number['low']:.3g}, {number['high']:.3g}]"
-
-
-def wish(wanted):
-    """A range in words."""
-    if wanted is None:
-        return "(told)"
-    low, high = wanted
-    if high is None:
-        return f"> {low:g}"
-    return f"< {high:g}" if low is None else f"{low:g} to {high:g}"
+    latest = ledger.latest(rows, lambda row: row["criteria"] == criteria.get(row["claim"]) and numbers_of(row))
+    return as_table(chain.from_iterable(map(expanded, latest)))
 
 
 # ---- the command
@@ -352,13 +234,14 @@ def command(options):
     Parameters
     ----------
     options : argparse.Namespace
-        ids (all claims if empty, or "worlds"), seeds (None for the usual number), first_seed, quick,
-        folder (None for the usual one), scheduler.
+        ids (all claims if empty; or "criteria", "worlds"), seeds and first_seed (None for the
+        usual ones), quick, folder (None for the usual one), scheduler.
 
     Raises
     ------
     ValueError
-        If a claim is unknown, there are too few seeds, or experiments failed.
+        If a claim is unknown, there are too few seeds, seeds have judged under other criteria,
+        criteria are not those that were frozen, or experiments failed.
     KeyboardInterrupt
         When interrupted, with the words where it goes on.
     ImportError
@@ -366,51 +249,78 @@ def command(options):
     OSError
         If the folder cannot be written to.
     """
-    if "worlds" in options.ids:
-        if options.ids != ["worlds"]:
-            raise ValueError(f"worlds is a study of its own, got {' '.join(options.ids)}")
-        survey_worlds(options)
-        return
-    if options.first_seed:
-        raise ValueError(f"the claims are tested from seed 0 on, got --first-seed {options.first_seed}")
+    for name, other in OTHERS.items():
+        if name in options.ids:
+            if options.ids != [name]:
+                raise ValueError(f"{name} is a study of its own, got {' '.join(options.ids)}")
+            other(options)
+            return
     unknown = [id for id in options.ids if id not in CLAIMS]
     if unknown:
-        raise ValueError(f"no claim {', '.join(unknown)}; known: {', '.join(CLAIMS)}; or worlds")
-    seeds = (QUICK_SEEDS if options.quick else SEEDS) if options.seeds is None else options.seeds
-    if seeds < 2:
-        raise ValueError(f"an interval needs at least 2 seeds, got {seeds}")
+        known = ", ".join(CLAIMS)
+        raise ValueError(f"no claim {', '.join(unknown)}; known: {known}; or {', '.join(OTHERS)}")
+    seeds = seeds_of(options)
     need("lab")
     folder = options.folder or Path("study-quick" if options.quick else "study")
+    ids, path = options.ids or list(CLAIMS), folder / "results.csv"
+    if report_beside(folder):
+        check_frozen(ids, seeds, folder / FROZEN)
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "results.csv"
     check_writable(path)
     if report_beside(folder) and not path.exists():
         choose_noises()
     with going_on_in(path):
-        table = run_study(options.ids or list(CLAIMS), range(seeds), path, options.scheduler)
+        table = run_study(ids, seeds, path, options.scheduler)
     publish(table, folder)
 
 
-def publish(table, folder):
-    """Write claims.json into the folder; beside REPLICATION.md if the study is the one told there.
+def seeds_of(options):
+    """The seeds that the command line asks for."""
+    first = (0 if options.quick else FIRST_SEED) if options.first_seed is None else options.first_seed
+    count = (QUICK_SEEDS if options.quick else SEEDS) if options.seeds is None else options.seeds
+    if count < 2 or not 0 <= first <= 2**31 - count:
+        raise ValueError(f"an interval needs at least 2 seeds, from 0 on, got {count} from {first} on")
+    return range(first, first + count)
 
-    Its table of claims and the golden numbers are then written as well: all of them, or none. The
-    report, which people wrote, comes last, so that it is there at any time.
+
+def freeze(options):
+    """Write what every claim is judged by into criteria.json, before the numbers are there.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        As `command` takes them.
     """
-    found, report = summaries(table), report_beside(folder)
-    for claim in found:
-        print(f"{claim['id']:17}{claim['verdict']:15}{claim['seeds']:4} seeds")
-    written = [(folder.parent if report else folder) / "claims.json"]
-    with together():
-        write(written[0], VERDICTS, as_json(found))
-        if report:
-            written += [folder / "golden.json", report]
-            write(written[1], NUMBERS, as_json(golden_numbers(table)))
-            write(report, REPORT, put_between_marks(report.read_text(), "claims", claims_table(found)))
-    print(f"wrote {', '.join(map(str, [folder / 'results.csv', *written]))}")
+    folder, seeds = options.folder or Path("study"), seeds_of(options)
+    stamps = {id: stamp(claim) for id, claim in CLAIMS.items()}
+    refuse_judged(list(CLAIMS), seeds, folder / "results.csv", stamps)
+    folder.mkdir(parents=True, exist_ok=True)
+    with whole_file(folder / FROZEN, "w", CRITERIA) as stream:
+        stream.write(as_json(frozen(seeds)))
+    print(f"wrote {folder / FROZEN}: {len(CLAIMS)} claims, to be judged on seeds {seeds[0]} to {seeds[-1]}")
 
 
-def write(path, kind, text):
-    """Write a text, whole or not at all, over nothing of another kind."""
-    with whole_file(path, "w", kind) as stream:
-        stream.write(text)
+def frozen(seeds):
+    """What every claim is judged by, and on which seeds, as plain values for JSON."""
+    rule = {"fingerprint": fingerprint(RULE), "level": LEVEL, "family": FAMILY}
+    claims = {id: {"fingerprint": stamp(claim)["criteria"]} | asked_of(claim) for id, claim in CLAIMS.items()}
+    return {"rule": rule, "seeds": [seeds[0], seeds[-1]], "claims": claims}
+
+
+def check_frozen(ids, seeds, path):
+    """Refuse criteria that are not those frozen in a file, and seeds for which they were not frozen."""
+    if not path.exists():
+        raise ValueError(f"no criteria are frozen in {path}: dollop study criteria writes them")
+    known = json.loads(path.read_text())
+    other = [id for id in ids if known["claims"].get(id, {}).get("fingerprint") != stamp(CLAIMS[id])["criteria"]]
+    if other:
+        told = f"the criteria of {', '.join(other)} are not those frozen in {path}"
+        raise ValueError(f"{told}; freeze them for seeds never used: dollop study criteria --first-seed N")
+    first, last = known["seeds"]
+    if seeds[0] < first or seeds[-1] > last:
+        told = f"REPLICATION.md is judged on seeds {first} to {last}, got {seeds[0]} to {seeds[-1]}"
+        raise ValueError(f"{told}; with --folder others can be looked at")
+
+
+OTHERS = {"criteria": freeze, "worlds": survey_worlds}
+"""What `dollop study` does beside the claims, each a study of its own."""

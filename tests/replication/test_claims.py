@@ -2,6 +2,8 @@
 
 import json
 import sys
+from dataclasses import replace
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -11,16 +13,23 @@ from scipy.stats import binom
 from scipy.stats import t as student
 
 import dollop
-from dollop.replication import recordings, study
-from dollop.replication.claims import CLAIMS, environment, learning, observing
+from dollop.replication import judging, recordings, report, study
+from dollop.replication.claims import CLAIMS, Criterion, environment, learning, observing, premises
+from dollop.replication.claims.claim import claim as registered
 
 GOLDEN = json.loads((ROOT / "study" / "golden.json").read_text())
+FROZEN = json.loads((ROOT / "study" / "criteria.json").read_text())
 PUBLISHED = {claim["id"]: claim for claim in json.loads((ROOT / "claims.json").read_text())}
 NUMBERS = [(claim, criterion) for claim in CLAIMS.values() for criterion in claim.criteria]
 NAMES = [f"{claim.id}-{criterion.number}" for claim, criterion in NUMBERS]
+JUDGED = [(claim, criterion) for claim, criterion in NUMBERS if criterion.wanted]
+SEED = GOLDEN["parameters"]["seed"]
+OTHER = 0
+"""A seed that the study does not use."""
+OBSERVERS = recordings, observing, environment, premises
 CHANCE = 1e-4
-"""The probability that a number is refused though nothing has changed: of the hundred and more
-numbers together, one in about a hundred times.
+"""The probability that a number is refused though nothing has changed: of the two hundred and more
+numbers together, one in about fifty times.
 """
 
 pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
@@ -55,16 +64,37 @@ def number_of(summary, criterion):
     return found
 
 
-def made_now(seed):
-    """Rows of every claim for one seed, as the table has them."""
-    rows = ({"claim": id, "seed": seed} | study.work((id, str(seed))) for id in CLAIMS)
+def made_now(seed, ids=tuple(CLAIMS)):
+    """Rows of claims for one seed, as the table has them."""
+    rows = ({"claim": id, "seed": seed} | study.work((id, str(seed))) for id in ids)
     return list(chain.from_iterable(map(study.expanded, rows)))
 
 
 @pytest.fixture(scope="module")
-def fresh():
-    """Rows of every claim for three seeds, made now."""
-    return {seed: made_now(seed) for seed in range(study.QUICK_SEEDS)}
+def asked():
+    """By which methods people are observed in Sec. II (True) and in others, as `fresh` makes their numbers."""
+    return {True: set(), False: set()}
+
+
+@pytest.fixture(scope="module")
+def fresh(asked):
+    """Rows of every claim for the golden seed, and for another of no study, each made now."""
+    rows = {SEED: [], OTHER: []}
+    for seed, made in rows.items():
+        for of_paper, methods in asked.items():
+            forget()
+            with pytest.MonkeyPatch.context() as patch:
+                for module in OBSERVERS:
+                    patch.setattr(module, "observe", partial(observed, methods))
+                made += made_now(seed, [claim.id for claim in CLAIMS.values() if (claim.section == "II") == of_paper])
+        made.sort(key=lambda row: [*CLAIMS].index(row[0]))
+    return rows
+
+
+def observed(methods, *arguments, **options):
+    """What `dollop.observe` makes, the method being noted."""
+    methods.add(options.get("method", "people"))
+    return dollop.observe(*arguments, **options)
 
 
 def test_rerunnable(fresh):
@@ -77,35 +107,73 @@ def test_rerunnable(fresh):
 def test_repeatable(fresh):
     """The same seed twice, everything made anew, gives the same numbers to the last digit."""
     assert forget() >= 8  # recordings, observations, laps, task, slaloms, runs, looks, background
-    assert as_numbers(made_now(0)) == as_numbers(fresh[0])
+    assert as_numbers(made_now(SEED)) == as_numbers(fresh[SEED])
 
 
 def test_reproducible(fresh):
     """Fresh numbers of one seed are the golden ones within their tolerance, on any processor."""
-    numbers = as_numbers(fresh[GOLDEN["parameters"]["seed"]])
+    numbers = as_numbers(fresh[SEED])
     assert len(numbers) == sum(map(len, GOLDEN["numbers"].values()))
     for (id, number), value in numbers.items():
         golden = GOLDEN["numbers"][id][number]
         assert value == pytest.approx(golden["value"], rel=0, abs=golden["tolerance"]), (id, number)
 
 
+# ---- criteria
+
+
+def test_every_claim_has_words_an_experiment_and_what_matters():
+    """No claim without a quotation, without what is measured, or judged without a smallest effect."""
+    assert len(CLAIMS) >= 38
+    for claim in CLAIMS.values():
+        assert claim.quote.strip() and claim.section and claim.experiment.__doc__.strip(), claim.id
+        assert any(each.wanted for each in claim.criteria), claim.id
+    for claim, criterion in JUDGED:
+        assert criterion.matters and 0 < criterion.matters < np.inf, (claim.id, criterion.number)
+
+
+@pytest.mark.parametrize("bad", [{"quote": " "}, {"matters": None}, {"matters": 0.0}, {"matters": np.inf}])
+def test_a_claim_without_words_or_smallest_effect_is_refused(bad):
+    """It cannot be registered."""
+    quote, matters = bad.get("quote", "words"), bad.get("matters", 0.05)
+    with pytest.raises(ValueError, match=r"words|matters"):
+        registered("I", quote, Criterion("number", "a number", (0, 1), matters))(lambda seed: {"number": 1.0})
+
+
+def test_no_criterion_has_been_changed_since_they_were_frozen():
+    """Code, frozen file and every line of the table agree on what each claim is judged by."""
+    stamps = {id: study.stamp(claim)["criteria"] for id, claim in CLAIMS.items()}
+    assert {id: each["fingerprint"] for id, each in FROZEN["claims"].items()} == stamps
+    rows, _ = study.ledger_at(ROOT / "study" / "results.csv").read()
+    assert {(row["claim"], row["criteria"]) for row in rows} == set(stamps.items())
+    first, last = FROZEN["seeds"]
+    assert {int(row["seed"]) for row in rows} == set(range(first, last + 1))
+
+
+def test_the_family_is_as_large_as_the_rule_takes_it_to_be():
+    """There are no more criteria than the error is shared among, nor far fewer."""
+    assert 0.5 * judging.FAMILY < len(JUDGED) <= judging.FAMILY
+
+
+# ---- numbers over the seeds
+
+
 @pytest.mark.parametrize(("claim", "criterion"), NUMBERS, ids=NAMES)
-def test_a_hundred_seeds_are_behind_every_claim(claim, criterion):
+def test_two_hundred_seeds_are_behind_every_claim(claim, criterion):
     """Of every number half of them at least: where a matching is ambiguous there is none."""
-    assert PUBLISHED[claim.id]["seeds"] >= 100 and recorded(claim, criterion)["seeds"] >= 50
+    assert PUBLISHED[claim.id]["seeds"] == 200 and recorded(claim, criterion)["seeds"] >= 100
 
 
 @pytest.mark.parametrize(("claim", "criterion"), NUMBERS, ids=NAMES)
 def test_fresh_numbers_are_as_recorded(claim, criterion, fresh):
-    """The mean over three seeds made now is as near to the recorded mean as its spread has it.
+    """The number of a seed of no study is as near to the recorded mean as its spread has it.
 
     It is farther off with the probability `CHANCE`: by Student's t for the difference of two means;
     for a share of trials, by the binomial at both ends of the recorded interval. How long something
     takes depends on the machine: there it is only asked that it takes time.
     """
     key, then = (claim.id, criterion.number), recorded(claim, criterion)
-    rows = list(chain.from_iterable(fresh.values()))
-    made = [value for id, _, number, value in rows if (id, number) == key]
+    made = [value for id, _, number, value in fresh[OTHER] if (id, number) == key]
     values = np.array(made)[np.isfinite(made)]
     if criterion.timed:
         assert values.min() > 0
@@ -121,13 +189,14 @@ def test_fresh_numbers_are_as_recorded(claim, criterion, fresh):
 
 
 def test_what_is_published_follows_from_the_table():
-    """claims.json, golden.json and the table in REPLICATION.md are made of the results by rule."""
-    table = study.read_table(ROOT / "study" / "results.csv")
-    found = study.summaries(table)
+    """claims.json, golden.json, CLAIMS.md and what REPLICATION.md tells are made of the results by rule."""
+    table, text = study.read_table(ROOT / "study" / "results.csv"), (ROOT / "REPLICATION.md").read_text()
+    found = report.summaries(table)
     assert found == list(PUBLISHED.values())
     assert [claim["id"] for claim in found] == list(CLAIMS)
-    assert study.claims_table(found) in (ROOT / "REPLICATION.md").read_text()
-    assert study.golden_numbers(table) == GOLDEN
+    assert report.told_anew(text, found, report.first_verdicts(ROOT / "study")) == text
+    assert report.claims_page(found) == (ROOT / "CLAIMS.md").read_text()
+    assert report.golden_numbers(table) == GOLDEN
 
 
 def test_another_table_changes_files_of_results_and_no_code(tmp_path):
@@ -137,13 +206,13 @@ def test_another_table_changes_files_of_results_and_no_code(tmp_path):
     table, folder = study.as_table(rows), tmp_path / "study"
     folder.mkdir()
     (tmp_path / "REPLICATION.md").write_text((ROOT / "REPLICATION.md").read_text())
-    study.publish(table, folder)
+    report.publish(table, folder)
     written = {path.name for path in tmp_path.rglob("*") if path.is_file()}
-    assert written == {"REPLICATION.md", "claims.json", "golden.json"}
+    assert written == {"REPLICATION.md", "CLAIMS.md", "claims.json", "claims.png", "golden.json"}
     found = json.loads((tmp_path / "claims.json").read_text())
     published = {each["id"]: each for each in found}
     golden = json.loads((folder / "golden.json").read_text())["numbers"]
-    assert study.claims_table(found) in (tmp_path / "REPLICATION.md").read_text()
+    assert report.verdicts_table(found) in (tmp_path / "REPLICATION.md").read_text()
     for claim, criterion in NUMBERS:
         values = table.value[(table.claim == claim.id) & (table.number == criterion.number)]
         number = number_of(published[claim.id], criterion)
@@ -166,8 +235,8 @@ def test_claims_of_section_v_learn_as_the_paper_does(id, monkeypatch):
     whole = CLAIMS[id].experiment(0)
     learned = learning.slaloms
 
-    def as_paper(seed, method="paper"):
-        return learned(seed, "paper")
+    def as_paper(seed, how):
+        return learned(seed, replace(how, learning="paper"))
 
     monkeypatch.setattr(learning, "slaloms", as_paper)
     alone = CLAIMS[id].experiment(0)
@@ -185,19 +254,6 @@ def test_every_verdict_is_told():
             assert f"`{claim['id']}`" in text, claim["id"]
 
 
-@pytest.mark.parametrize("of_paper", [True, False], ids=["Sec. II", "later"])
-def test_what_the_paper_says_of_observing_is_measured_on_its_own_method(of_paper, monkeypatch):
+def test_what_the_paper_says_of_observing_is_measured_on_its_own_method(fresh, asked):
     """Claims of Sec. II observe with method="paper" alone, those of all other sections never do."""
-    asked = set()
-
-    def observe(*arguments, **options):
-        asked.add(options.get("method", "people"))
-        return dollop.observe(*arguments, **options)
-
-    forget()
-    for module in (recordings, observing, environment):
-        monkeypatch.setattr(module, "observe", observe)
-    ids = [claim.id for claim in CLAIMS.values() if (claim.section == "II") == of_paper]
-    assert len(ids) > 6 and all(study.work((id, "0"))["numbers"] for id in ids)
-    assert asked == {"paper" if of_paper else "people"}
-    forget()
+    assert len(fresh) == 2 and asked == {True: {"paper"}, False: {"people"}}

@@ -14,7 +14,7 @@ from dollop.checks import EXTRAS
 from dollop.cli import main
 from dollop.formats.files import FormatError
 from dollop.lds import LDS
-from dollop.replication import ledger, running, study
+from dollop.replication import judging, ledger, report, running, study
 from dollop.replication.claims import (
     Claim,
     Criterion,
@@ -30,7 +30,7 @@ from dollop.sequenced_lds import SequencedLDS
 
 def claim_of(experiment):
     """A claim that wants a positive number of an experiment."""
-    criterion = Criterion("number", "a number", (0, np.inf))
+    criterion = Criterion("number", "a number", (0, np.inf), matters=1.0)
     return Claim("fake", "I", "words", (criterion,), experiment)
 
 
@@ -89,10 +89,10 @@ def test_a_study_goes_on_where_it_was(tmp_path, runs):
 
 
 def test_a_number_that_is_new_is_filled_in(tmp_path, runs):
-    """A claim with another criterion is run again for it, and no number stands twice."""
+    """A claim that tells another number is run again for it, and no number stands twice."""
     claim = counting(runs)["fake"]
     study.run_study(["fake"], [0], tmp_path / "results.csv", claims={"fake": claim}, jobs=0)
-    more = replace(claim, criteria=(*claim.criteria, replace(claim.criteria[0], number="other")))
+    more = replace(claim, criteria=(*claim.criteria, Criterion("other", "a number that is told")))
     more = replace(more, experiment=lambda seed: {"number": 1.0, "other": 2.0})
     table = study.run_study(["fake"], [0], tmp_path / "results.csv", claims={"fake": more}, jobs=0)
     assert dict(zip(table.number, table.value, strict=True)) == {"number": 1.0, "other": 2.0}
@@ -196,7 +196,7 @@ def test_the_command_writes_table_and_claims(tmp_path, capsys):
     ("arguments", "message"),
     [
         (["nonsense"], "no claim nonsense; known: single, filter, centroid"),
-        (["combined", "--seeds", "1"], "an interval needs at least 2 seeds, got 1"),
+        (["combined", "--seeds", "1"], "an interval needs at least 2 seeds, from 0 on, got 1 from 1000 on"),
     ],
 )
 def test_bad_calls_end_with_a_message(arguments, message, tmp_path, monkeypatch):
@@ -239,9 +239,9 @@ def test_a_table_of_something_else_is_refused(content, tmp_path):
 def test_numbers_of_other_code_are_made_anew(tmp_path, runs, monkeypatch, capsys):
     """They are counted on the error stream, the new number takes the place of the old; what nobody asks for stays."""
     path, claims = tmp_path / "results.csv", counting(runs)
-    monkeypatch.setattr(study, "fingerprint", lambda module: "0" * 12)
+    monkeypatch.setattr(study, "fingerprint", lambda module: "rule" if module == study.RULE else "0" * 12)
     study.run_study(["fake"], range(3), path, claims=claims, jobs=0)
-    monkeypatch.setattr(study, "fingerprint", lambda module: "1" * 12)
+    monkeypatch.setattr(study, "fingerprint", lambda module: "rule" if module == study.RULE else "1" * 12)
     study.run_study(["fake"], range(2), path, claims=claims, jobs=0)
     assert sorted(each.name for each in runs.iterdir()) == ["0-0", "0-1", "1-0", "1-1", "2-0"]
     assert [line.split(",")[3] for line in path.read_text().splitlines()[1:]] == ["1" * 12, "1" * 12, "0" * 12]
@@ -249,16 +249,54 @@ def test_numbers_of_other_code_are_made_anew(tmp_path, runs, monkeypatch, capsys
     assert f"2 rows of {path} are of other code" in told and f"1 rows of {path} are of other code and stay" in told
 
 
-def test_a_criterion_that_is_changed_keeps_its_numbers_and_is_told(tmp_path, runs, capsys):
-    """What is wanted of a number does not change it; but it should have been there before."""
+@pytest.mark.parametrize("change", [{"wanted": (4, np.inf)}, {"matters": 0.5}, {"trials": 1}])
+def test_seeds_judge_by_no_other_criteria(change, tmp_path, runs):
+    """Once a seed has judged a claim, another range, effect or interval is refused, and the table stays as it is."""
+    path, claims = tmp_path / "results.csv", counting(runs)
+    study.run_study(["fake"], range(3), path, claims=claims, jobs=0)
+    before, claim = path.read_text(), claims["fake"]
+    other = {"fake": replace(claim, criteria=(replace(claim.criteria[0], **change),))}
+    with pytest.raises(ValueError, match="seeds 1 to 2 have judged fake under other criteria.*--first-seed 3"):
+        study.run_study(["fake"], range(1, 5), path, claims=other, jobs=0)
+    assert path.read_text() == before
+    assert study.run_study(["fake"], range(3, 5), path, claims=other, jobs=0).seed.tolist() == [3, 4]
+
+
+def test_what_is_told_may_change(tmp_path, runs):
+    """How a number is described, and what is told beside it, are no criteria."""
     path, claims = tmp_path / "results.csv", counting(runs)
     study.run_study(["fake"], range(2), path, claims=claims, jobs=0)
-    assert "older than the criteria" not in capsys.readouterr().err
     claim = claims["fake"]
-    other = replace(claim, criteria=(replace(claim.criteria[0], wanted=(4, 5)),))
-    study.run_study(["fake"], range(2), path, claims={"fake": other}, jobs=0)
-    assert "numbers are older than the criteria that judge them now, and are kept: fake" in capsys.readouterr().err
+    other = {"fake": replace(claim, criteria=(replace(claim.criteria[0], meaning="in other words"),))}
+    assert len(study.run_study(["fake"], range(2), path, claims=other, jobs=0)) == 2
     assert len(list(runs.iterdir())) == 2
+
+
+def test_the_first_study_s_seeds_are_used_up(tmp_path, runs):
+    """They stand in a table of their own beside the study's."""
+    study.run_study(["fake"], range(3), tmp_path / study.FIRST, claims=counting(runs), jobs=0)
+    claim = counting(runs)["fake"]
+    other = {"fake": replace(claim, quote="other words")}
+    with pytest.raises(ValueError, match="seeds 0 to 1 have judged fake"):
+        study.run_study(["fake"], range(2), tmp_path / "results.csv", claims=other, jobs=0)
+
+
+def test_criteria_are_frozen_before_a_report_is_judged(tmp_path, monkeypatch):
+    """Beside REPLICATION.md nothing is judged without them, by others, or on other seeds than theirs."""
+    place = ["--folder", str(tmp_path / "study")]
+    (tmp_path / "REPLICATION.md").write_text("# Report\n")
+    monkeypatch.setattr(study, "run_study", lambda *_: pytest.fail("work was begun"))
+    with pytest.raises(SystemExit, match=r"no criteria are frozen in .*criteria\.json: dollop study criteria"):
+        main(["study", "combined", *place])
+    main(["study", "criteria", "--first-seed", "5000", "--seeds", "50", *place])
+    kept = json.loads((tmp_path / "study" / "criteria.json").read_text())
+    assert kept["seeds"] == [5000, 5049] and set(kept["claims"]) == set(study.CLAIMS)
+    with pytest.raises(SystemExit, match="judged on seeds 5000 to 5049, got 1000 to 1199"):
+        main(["study", "combined", *place])
+    other = replace(study.CLAIMS["combined"], quote="other words")
+    monkeypatch.setitem(study.CLAIMS, "combined", other)
+    with pytest.raises(SystemExit, match="the criteria of combined are not those frozen"):
+        main(["study", "combined", "--first-seed", "5000", "--seeds", "2", *place])
 
 
 def test_numbers_come_back_to_six_digits(tmp_path):
@@ -275,7 +313,10 @@ def test_numbers_come_back_to_six_digits(tmp_path):
 
 
 def test_every_line_of_the_study_is_sound_and_of_one_code_for_each_claim():
-    """The committed table has a line for each claim and seed, in order, none of them damaged or set aside."""
+    """The committed table has a line for each claim and seed, in order, none of them damaged or set aside.
+
+    All of a claim's lines are of one code.
+    """
     rows, damaged = study.ledger_at(ROOT / "study" / "results.csv").read()
     jobs = [(row["claim"], int(row["seed"])) for row in rows]
     assert damaged == 0 and jobs == sorted(set(jobs)) and all(map(study.numbers_of, rows))
@@ -289,7 +330,7 @@ def test_intervals_cover_the_truth():
         (rng.normal(3.0, 1.0, (1000, 20)), 3.0, False),
         (rng.random((1000, 20)) < 0.3, 0.3, True),
     ):
-        ends = [study.interval(values, share)[1:] for values in drawn]
+        ends = [judging.interval(values, share, 0.95)[1:] for values in drawn]
         assert 0.93 < np.mean([low <= truth <= high for low, high in ends]) < 0.98
 
 
@@ -306,21 +347,21 @@ def test_intervals_cover_the_truth():
 )
 def test_the_verdict_follows_the_rule(answers, words):
     """All criteria met; some, or none and none clearly not; none, and one clearly not."""
-    assert study.verdict(answers) == words
+    assert judging.verdict(answers) == words
 
 
 def test_a_criterion_is_met_only_by_the_whole_interval():
     """A mean above zero whose interval reaches below leaves it open; no number at all does too."""
-    criterion = Criterion("number", "a number", (0, np.inf))
+    criterion = Criterion("number", "a number", (0, np.inf), matters=0.1)
     for values, answer in (
-        ([1.0, 1.1, 0.9], "yes"),
+        ([1.0, 1.001, 0.999], "yes"),
         ([1.0, -0.8, 0.5], "open"),
-        ([-1.0, -1.1, -0.9], "no"),
+        ([-1.0, -1.001, -0.999], "no"),
         ([], "open"),
     ):
-        assert study.measured(criterion, np.array(values))["met"] == answer
-    assert study.measured(criterion, np.zeros(5))["met"] == "no"
-    assert study.measured(criterion, np.array([]))["mean"] is None
+        assert report.measured(criterion, np.array(values))["met"] == answer
+    assert report.measured(criterion, np.zeros(5))["met"] == "no"
+    assert report.measured(criterion, np.array([]))["mean"] is None
 
 
 def test_only_what_stands_between_the_marks_is_replaced():
@@ -464,17 +505,72 @@ def test_passing_places_are_in_turn_left_and_right():
     assert learning.intended_places(cones)[:, 1].tolist() == [0.75, -0.75, 0.75]
 
 
-def test_golden_numbers_are_those_of_one_seed():
+def test_golden_numbers_are_those_of_the_first_seed():
     """Times are left out, nan becomes None; tolerances are a share of the spread, or the floor."""
-    rows = [("time", 0, "seconds", 0.1)]
-    rows += [("loss", seed, "lost_per_lap", value) for seed, value in enumerate((np.nan, 1.0))]
-    rows += [("scaled", seed, "off_percent", value) for seed, value in enumerate((2.0, 4.0, 6.0))]
-    rows += [("parameters", seed, "numbers", 44.0) for seed in range(3)]
-    assert study.golden_numbers(study.as_table(rows))["numbers"] == {
+    rows = [("time", 5, "seconds", 0.1)]
+    rows += [("loss", 5 + k, "lost_per_lap", value) for k, value in enumerate((np.nan, 1.0))]
+    rows += [("scaled", 5 + k, "off_percent", value) for k, value in enumerate((2.0, 4.0, 6.0))]
+    rows += [("parameters", 5 + k, "numbers", 44.0) for k in range(3)]
+    golden = report.golden_numbers(study.as_table(rows))
+    assert golden["parameters"]["seed"] == 5
+    assert golden["numbers"] == {
         "loss": {"lost_per_lap": {"value": None, "tolerance": 1e-9}},
         "parameters": {"numbers": {"value": 44.0, "tolerance": 4.4e-5}},
         "scaled": {"off_percent": {"value": 2.0, "tolerance": 0.02}},
     }
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "wanted", "answer", "edge"),
+    [
+        (0.03, 0.05, (0.01, np.inf), "yes", False),
+        (0.015, 0.05, (0.01, np.inf), "yes", True),
+        (0.002, 0.008, (0.01, np.inf), "no", True),
+        (-0.03, -0.01, (0.01, np.inf), "no", False),
+        (0.96, 1.0, (0.9, 1), "yes", False),
+        (0.96, 1.02, (0.9, 1), "yes", False),
+        (0.905, 0.94, (0.9, 1), "yes", True),
+        (0.02, 0.03, (0, 0.1), "yes", False),
+        (0.02, 0.095, (0, 0.1), "yes", True),
+        (0.5, 0.6, (-np.inf, 0.1), "no", False),
+        (-0.62, -0.58, (-0.7, -0.3), "yes", False),
+    ],
+)
+def test_edges_are_where_the_smallest_effect_would_change_the_answer(low, high, wanted, answer, edge):
+    """Ends that nothing can be beyond, 0 of what is never less and 1 of a share, are no edges."""
+    matters = 0.05 if wanted[1] == 1 else 0.01
+    assert judging.met(low, high, wanted) == answer
+    assert judging.at_edge(low, high, wanted, matters) == edge
+
+
+def test_all_intervals_hold_together():
+    """Of 200 families of a hundred intervals nearly all hold all their means; of single ones hardly any would."""
+    rng, whole, alone = np.random.default_rng(3), 0, 0
+    for _ in range(100):
+        families = rng.normal(0, 1, (judging.FAMILY, 200))
+        whole += all(low <= 0 <= high for _, low, high in map(judging.interval, families))
+        alone += all(low <= 0 <= high for _, low, high in (judging.interval(each, level=0.95) for each in families))
+    assert whole >= 90 and alone <= 5
+
+
+FOUND = [{"id": "luck", "numbers": [{"number": "hit", "mean": -0.23456}]}]
+
+
+@pytest.mark.parametrize(
+    ("was", "now"),
+    [("20 %", "23 %"), ("-0.1", "-0.2"), ("5.0 mm", "234.6 mm"), ("1", "0"), ("3.12 m", "0.23 m"), ("1°", "0°")],
+)
+def test_quoted_numbers_are_written_anew_as_exactly_as_before(was, now):
+    """Unit and decimals stay; the sign is that of the words, unless it stands there."""
+    text = f'It is [{was}](CLAIMS.md#luck "hit") there.'
+    assert report.with_numbers(text, FOUND) == text.replace(was, now)
+
+
+@pytest.mark.parametrize("text", ['[a lot](CLAIMS.md#luck "hit")', '[1](CLAIMS.md#luck "other")'])
+def test_a_quotation_of_nothing_is_refused(text):
+    """Words that are no number, and numbers that no claim has."""
+    with pytest.raises(ValueError, match=r"digits and a unit|no claim tells"):
+        report.with_numbers(text, FOUND)
 
 
 def test_the_noise_is_chosen_among_the_candidates(tmp_path, monkeypatch):
@@ -494,7 +590,7 @@ def test_what_is_chosen_is_kept_with_its_parameters():
     assert set(kept["noises"]) == set(observing.MODELS)
     assert set(kept["noises"].values()) <= set(observing.NOISES)
     assert kept["parameters"]["candidates"] == list(observing.NOISES)
-    assert min(kept["parameters"]["seeds"]) >= study.SEEDS
+    assert min(kept["parameters"]["seeds"]) >= study.FIRST_SEED + study.SEEDS
 
 
 def test_errors_depend_on_the_noise():
@@ -512,18 +608,19 @@ def test_noise_is_chosen_anew_with_the_study_itself(tmp_path, monkeypatch):
     chosen = []
     monkeypatch.setattr(study, "choose_noises", lambda: chosen.append(1))
     marks = "<!-- claims: begin -->\n<!-- claims: end -->\n"
-    for folder, report, table, times in (
+    for folder, told, table, times in (
         ("study", True, False, 1),
         ("study", True, True, 0),
         ("study", False, False, 0),
         ("other", True, False, 0),
     ):
         chosen.clear()
-        place = tmp_path / f"{folder}-{report}-{table}" / folder
+        place = tmp_path / f"{folder}-{told}-{table}" / folder
         place.mkdir(parents=True)
-        if report:
+        if told:
             (place.parent / "REPLICATION.md").write_text(marks)
         if table:
             (place / "results.csv").write_text(header)
+        main(["study", "criteria", "--folder", str(place)])
         main(["study", "combined", "--folder", str(place)])
         assert len(chosen) == times

@@ -98,7 +98,17 @@ def claim(section, quote, *criteria, constructed=False, choices=()):
     callable
         Decorator that leaves the experiment as it is. An underscore behind a name that is Python's
         own, `filter_`, is no part of the claim's.
+
+    Raises
+    ------
+    ValueError
+        There are no words, or no smallest difference that matters of a number that is judged.
     """
+    if not quote.strip():
+        raise ValueError("a claim needs the paper's words")
+    for each in criteria:
+        if each.wanted and not (each.matters and 0 < each.matters < inf):
+            raise ValueError(f"of {each.number}, which is judged, it must be told what matters, got {each.matters}")
 
     def register(experiment):
         id = experiment.__name__.rstrip("_")

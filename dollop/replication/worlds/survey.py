@@ -276,15 +276,16 @@ def command(options):
         When interrupted, with the words where it goes on.
     """
     count = (QUICK_SEEDS if options.quick else SEEDS) if options.seeds is None else options.seeds
-    if count < 1 or not 0 <= options.first_seed <= 2**31 - count:
-        raise ValueError(f"worlds need a seed or more, from 0 on, got {count} from {options.first_seed} on")
+    first = options.first_seed or 0
+    if count < 1 or not 0 <= first <= 2**31 - count:
+        raise ValueError(f"worlds need a seed or more, from 0 on, got {count} from {first} on")
     need("lab")
     folder = options.folder or Path("study-quick" if options.quick else "study")
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "worlds.csv"
     check_writable(path)
     with going_on_in(path):
-        table = run_survey(range(options.first_seed, options.first_seed + count), path, options.scheduler)
+        table = run_survey(range(first, first + count), path, options.scheduler)
     publish(table, folder)
 
 
