@@ -1,7 +1,7 @@
-"""What follows from a choice: laser and walker, laws, tasks and models as a reconstruction has them.
+"""What follows from a choice: laser, walker, laws, tasks and models as reconstructed.
 
-Where a choice is as told, this is the library's own way, to the last digit; what it does not offer is
-here, as simply as it can be.
+Where a choice is as told, this is the library's own way, to the last digit; what it does not
+offer is here, as simply as it can be.
 """
 
 from dataclasses import dataclass, replace
@@ -34,12 +34,18 @@ from dollop.tracking import Motion, Tracker
 from dollop.trajectory import align, arc_length, distance_to_polyline, resample
 
 __all__ = [
-    "LAWS", "TIES", "ShownAs", "adapted", "as_paper", "following_of", "gait_of", "law_of", "learned",
-    "model_of", "motion_of", "response_of", "seen_by", "shown_as", "task_of",
+    "LAWS", "SEEN", "SHOWN_LAW", "TIES", "ShownAs", "adapted", "as_paper", "following_of", "gait_of",
+    "law_of", "learned", "model_of", "motion_of", "response_of", "seen_by", "shown_as", "task_of",
 ]  # fmt: skip
 
 LAWS = ("lds", "tolerance", "cuts", "laid")
 """Fields on which a law depends."""
+
+SEEN = ("laser_noise", "walker")
+"""Fields on which a recording depends."""
+
+SHOWN_LAW = (*LAWS, *SEEN)
+"""Fields on which a law depends that was fitted to what the laser saw."""
 
 TIES = ("weights", "corners")
 """Fields on which it depends where subgoals go when objects move."""
@@ -58,6 +64,10 @@ KNOWN_TO = 0.05
 
 DOUBT = 0.05
 """Chance at which anything that belongs together is left apart, over all pairs."""
+
+
+GAITS = {"torso": {}, "swaying": {"sway": 0.04, "drift": 0.08}, "legs": {"body": "legs"}}
+"""How each walker walks, and what the laser meets."""
 
 
 # ---- who is seen, and how
@@ -93,7 +103,7 @@ def gait_of(how=TOLD):
     dict
         Keywords of `dollop.lab.walk`; none for the usual walker.
     """
-    return {"torso": {}, "swaying": {"sway": 0.04, "drift": 0.08}, "legs": {"body": "legs"}}[how.walker]
+    return GAITS[how.walker]
 
 
 def motion_of(how=TOLD, **more):
@@ -169,13 +179,17 @@ def law_of(walks, how=TOLD, sample_period=0.1):
     if how.laid == TOLD.laid and how.cuts != "largest":
         exactly = 6 if how.cuts == "six" else None
         return SequencedLDS.fit(
-            walks, how.tolerance, exactly, retimed=how.lds == "re-timed", sample_period=sample_period
+            walks,
+            how.tolerance,
+            exactly,
+            retimed=how.lds == "re-timed",
+            sample_period=sample_period,
         )
     return simple_law([np.asarray(walk, float) for walk in walks], how, sample_period)
 
 
 def simple_law(walks, how, sample_period):
-    """A law of walks laid together and cut as chosen, not divided anew where rounding bends it, without pauses."""
+    """A law of walks laid together and cut as chosen, not divided anew where rounding bends it."""
     count = CANDIDATES if how.cuts == "largest" else 100
     if how.laid == "even":
         aligned = np.stack([resample(walk, 2 * count - 1) for walk in walks])
@@ -183,11 +197,15 @@ def simple_law(walks, how, sample_period):
     else:
         aligned, shares = align(walks, 2 * count - 1)
     moments = moments_at(walks, shares[:, ::2])
-    statistics = retimed_statistics(aligned) if how.lds == "re-timed" else raw_statistics(walks, moments)
+    retimed = how.lds == "re-timed"
+    statistics = retimed_statistics(aligned) if retimed else raw_statistics(walks, moments)
     path = aligned.mean(axis=0)[::2]
     cuts = chosen_cuts(path, statistics, how)
     found = statistics(cuts[:-1], np.diff(cuts))
-    segments, at = tuple(map(LDS, map(Statistics, found.G0, found.G1), path[cuts[1:]])), moments[:, cuts]
+    segments, at = (
+        tuple(map(LDS, map(Statistics, found.G0, found.G1), path[cuts[1:]])),
+        moments[:, cuts],
+    )
     law = SequencedLDS(segments, path[0], speeds_between(walks, at, sample_period))
     pauses, corners = np.zeros(len(segments) + 1), np.zeros(len(segments), bool)
     lengths = [line.way[-1] for line in law.lines()]
@@ -202,11 +220,15 @@ def chosen_cuts(path, statistics, how):
         return best_segments(segment_errors(path, statistics), 6)
     most, total = errors_of_all(path, statistics)
     kept = np.where(most <= how.tolerance, total, np.inf)
-    return fewest_segments(kept, 1e9)
+    try:
+        return fewest_segments(kept, np.inf)
+    except ValueError:
+        rule = f"a division at some of {len(path)} places must keep every place"
+        raise ValueError(f"{rule} within {how.tolerance} m, there is none") from None
 
 
 def errors_of_all(path, statistics):
-    """Largest and summed distance in m of a path (C, 2) to the response of every segment: (C, C) each."""
+    """Largest and summed distance in m of a path (C, 2) to the response of every segment, (C, C)."""
     count = len(path)
     most, total = np.full((2, count, count), np.inf)
     starts, ends = np.triu_indices(count, 2)
@@ -218,7 +240,7 @@ def errors_of_all(path, statistics):
 
 
 def whole_responses(statistics, places, goals, steps=STEPS + 8):
-    """Responses (B, steps + 2, 2) from places to goals (B, 2) in m; slow ones by every m-th state."""
+    """Responses (B, steps + 2, 2) from places to goals (B, 2); slow ones by every m-th state."""
     slow = -1 / np.log(np.clip(statistics.decay, 0.5, 1 - 1e-6)) * DECAY / steps
     matrices, doublings = statistics.matrix, np.ceil(np.log2(np.maximum(slow, 1))).astype(int)
     for k in range(doublings.max(initial=0)):
@@ -376,7 +398,7 @@ def relaid(task, how):
 
 
 def reweighed(association, how):
-    """An association with weights of the chosen power of the distance, to the chosen number of corners."""
+    """An association with weights of the chosen power of the distance, to so many corners."""
     if how.only(TIES) == TOLD:
         return association
     squares = (association.differences**2).sum(axis=2)
@@ -391,12 +413,16 @@ def learned_as_paper(demonstrations, how):
     environment = demonstrations[0].environment
     matchings, aside = matchings_into(environment, demonstrations)
     partners = tuple(None if each is None else each.partners for each in matchings)
-    used = [(shown, each) for shown, each in zip(demonstrations, matchings, strict=True) if each is not None]
+    pairs = zip(demonstrations, matchings, strict=True)
+    used = [(shown, each) for shown, each in pairs if each is not None]
     laws = [mapped(shown, matching, environment, how) for shown, matching in used]
     model = model_of([law.subgoals for law in laws], how)
     members = members_along(model)
     tied = reweighed(tied_to_all(used, environment, members), how)
-    law, notes = shared_law(laws, members, tied.relocate(environment)), (*notes_of(demonstrations), *aside)
+    law, notes = (
+        shared_law(laws, members, tied.relocate(environment)),
+        (*notes_of(demonstrations), *aside),
+    )
     return Task(law, environment, tied, model, demonstrations, notes, partners=partners)
 
 
@@ -428,7 +454,7 @@ def tied_to_all(used, environment, members):
 
 
 def centres_of(shown, matching, n):
-    """Where the n objects of the environment to learn in stood in a demonstration: (n, 2), nan for none."""
+    """Where the n objects to learn with stood in a demonstration: (n, 2) in m, nan for none."""
     centres, partners = np.full((n, 2), np.nan), matching.partners
     centres[partners[partners >= 0]] = shown.environment.centres[partners >= 0]
     return centres

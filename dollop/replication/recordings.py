@@ -20,7 +20,16 @@ from dollop.gridmap import OccupancyGrid, map_outputs
 from dollop.lab.recording import outputs as recording_outputs
 from dollop.matching import match
 from dollop.observation import observe
-from dollop.replication.choosing import LAWS, TIES, as_paper, gait_of, seen_by, shown_as, task_of
+from dollop.replication.choosing import (
+    LAWS,
+    SEEN,
+    TIES,
+    as_paper,
+    gait_of,
+    seen_by,
+    shown_as,
+    task_of,
+)
 from dollop.replication.reconstruction import TOLD, Reconstruction
 from dollop.replication.runs import free_poses
 from dollop.robot.avoidance import ObstacleMap
@@ -46,9 +55,6 @@ LAYOUTS = ((0.1, 0.4), (0.0, -0.7)), ((0.9, -0.4), (-0.7, -0.4)), ((-0.4, -0.6),
 KEPT = {"from_background": 0.30}
 """Walks of the figures and claims keep so far from the background, in m, shoulder to wall: the radius
 of Sec. II swallows what is nearer. A layout without room for that is drawn anew."""
-
-SEEN = ("laser_noise", "walker")
-"""Fields of a `Reconstruction` on which a recording depends."""
 
 
 def save_all(folder):

@@ -5,7 +5,7 @@ shown, is told beside it.
 """
 
 from dataclasses import replace
-from math import inf, nan
+from math import inf
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from dollop.laps import laps as laps_of
 from dollop.lds import LDS
 from dollop.pose import wrapped
 from dollop.replication import recordings
-from dollop.replication.choosing import LAWS, law_of
-from dollop.replication.claims.claim import MOSTLY, Criterion, claim
+from dollop.replication.choosing import SHOWN_LAW, law_of
+from dollop.replication.claims.claim import MOSTLY, Criterion, claim, unknown
 from dollop.replication.claims.measures import (
     SHARES,
     clear_of,
@@ -26,12 +26,15 @@ from dollop.replication.claims.measures import (
     segments_along,
 )
 from dollop.replication.reconstruction import TOLD
-from dollop.trajectory import arc_length, distance_to_polyline, mean_trajectory, resample, ways_apart
+from dollop.trajectory import (
+    arc_length,
+    distance_to_polyline,
+    mean_trajectory,
+    resample,
+    ways_apart,
+)
 
-__all__ = ["SHOWN_LAW"]
-
-SHOWN_LAW = (*LAWS, "laser_noise", "walker")
-"""What a law depends on that was fitted to what the laser saw."""
+__all__ = []
 
 
 @claim(
@@ -162,7 +165,12 @@ def farthest_end(law, places, method):
     "III",
     "multiple demonstrations of a trajectory can be incorporated to compute a more accurate "
     "generalization of the intended user trajectory",
-    Criterion("alone_more_m", "error of a law of one lap minus that of a law of several [m]", (0.01, inf), 0.01),
+    Criterion(
+        "alone_more_m",
+        "error of a law of one lap minus that of a law of several [m]",
+        (0.01, inf),
+        0.01,
+    ),
     Criterion("several_m", "error of a law of all laps but the last [m]"),
     Criterion("several_ours_m", "the same along our response [m]"),
     Criterion("alone_more_ours_m", "one lap minus several along our response [m]"),
@@ -209,7 +217,13 @@ def scaled(seed, how=TOLD):
     "III",
     "this estimated trajectory appears to capture the intentions of the original trajectory: a "
     "“figure-eight” trajectory that avoids the obstacles",
-    Criterion("eight", "share of laws that go round the cans in opposite directions", MOSTLY, 0.05, trials=1),
+    Criterion(
+        "eight",
+        "share of laws that go round the cans in opposite directions",
+        MOSTLY,
+        0.05,
+        trials=1,
+    ),
     Criterion("clearance_m", "least distance from law to can [m]", (0.25, inf), 0.05),
     choices=SHOWN_LAW,
 )
@@ -259,17 +273,18 @@ def segments(seed, how=TOLD):
     """
     shown = recordings.figure_eights(seed, how)
     walks, law = shown.laps, shown.task.law
+    mean = mean_trajectory(walks)
     numbers = {
         "n_segments": float(len(law.segments)),
-        "n_at_10_mm": float(len(law_of(walks, replace(how, tolerance=0.010)).segments)),
-        "n_at_40_mm": float(len(law_of(walks, replace(how, tolerance=0.040)).segments)),
-        "error_m": error_of(law, [mean_trajectory(walks)]),
+        "error_m": error_of(law, [mean]),
         "error_laps_m": error_of(law, walks),
-        "error_ours_m": error_of(law, [mean_trajectory(walks)], "held"),
+        "error_ours_m": error_of(law, [mean], "held"),
     }
-    for name, eights in EIGHTS.items():
-        numbers[f"n_{name}"] = float(len(law_of(walked_eights(seed, **eights)).segments)) if how == TOLD else nan
-    return numbers
+    if how != TOLD:
+        return unknown("segments") | numbers
+    told = {name: law_of(walked_eights(seed, **eights)) for name, eights in EIGHTS.items()}
+    told |= {f"at_{mm}_mm": law_of(walks, replace(how, tolerance=mm / 1000)) for mm in (10, 40)}
+    return numbers | {f"n_{name}": float(len(each.segments)) for name, each in told.items()}
 
 
 EIGHTS = {

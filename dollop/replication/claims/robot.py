@@ -13,8 +13,8 @@ import numpy as np
 from dollop.environment import Environment
 from dollop.pose import wrapped
 from dollop.replication import recordings
+from dollop.replication.choosing import SHOWN_LAW
 from dollop.replication.claims.claim import MOSTLY, Criterion, claim
-from dollop.replication.claims.law import SHOWN_LAW
 from dollop.replication.claims.measures import SHARES, headings, plain_run, segments_along, windings
 from dollop.replication.reconstruction import TOLD
 from dollop.replication.runs import distances_to_law, free_poses, return_times
@@ -63,8 +63,18 @@ def start_of(task, seed):
     "The sequenced-LDS representation is optimal for idealized systems, but we make no guarantees "
     "for nonholonomic, underactuated, or saturating systems.",
     Criterion("ideal_m", "mean distance of an ideal robot from the response [m]", (-inf, 0.02), 0.002),
-    Criterion("nonholonomic_more_m", "one that must turn, without limits, minus ideal [m]", (0.002, inf), 0.002),
-    Criterion("saturating_more_m", "with limits: at the shown speeds minus at half of them [m]", (0.002, inf), 0.002),
+    Criterion(
+        "nonholonomic_more_m",
+        "one that must turn, without limits, minus ideal [m]",
+        (0.002, inf),
+        0.002,
+    ),
+    Criterion(
+        "saturating_more_m",
+        "with limits: at the shown speeds minus at half of them [m]",
+        (0.002, inf),
+        0.002,
+    ),
     Criterion("ideal_early_m", "the ideal robot, handed over as early as the others [m]"),
     Criterion("nonholonomic_m", "the robot that must turn, without limits [m]"),
     Criterion("half_m", "with limits, at half the shown speeds [m]"),
@@ -194,7 +204,13 @@ def between_segments(law, places):
 @claim(
     "III",
     "the response of Agent Orange to being kidnapped seems to be a reasonable estimate of user intent",
-    Criterion("returned", "share that come back, touching nothing before", MOSTLY, 0.05, trials=KIDNAPPINGS),
+    Criterion(
+        "returned",
+        "share that come back, touching nothing before",
+        MOSTLY,
+        0.05,
+        trials=KIDNAPPINGS,
+    ),
     Criterion("finished", "share that finish, touching nothing", MOSTLY, 0.05, trials=KIDNAPPINGS),
     Criterion("goes_on", "share of these that go on as the user did", MOSTLY, 0.05),
     Criterion("heading_deg", "angle to the user's direction until back [degrees]", (-inf, 45), 5.0),
