@@ -24,7 +24,7 @@ from dollop.lab.drawn import TASKS, draw_demonstrations
 
 __all__ = [
     "ERGODIC", "Form", "LEFT_TO_RIGHT", "METHODS", "gaussian_hmm", "judge", "merged", "plain_mean", "study",
-    "summary",
+    "summary", "task_of",
 ]  # fmt: skip
 
 # ---- what each method takes for the task
@@ -135,7 +135,7 @@ class Form:
 
     passed: int | None = None
     covariance: str = "told"
-    starts: tuple = ("mean", "k-means", "k-means in order")
+    starts: tuple = ("mean", "k-means in order")
     criterion: str = "BIC"
 
     def __post_init__(self):
@@ -188,7 +188,7 @@ COVARIANCES = {"told": lambda k: 0, "diag": lambda k: 2 * k, "spherical": lambda
 """How many free numbers the covariances of k states have."""
 CRITERIA = ("BIC", "AIC", "ICL")
 ERGODIC, LEFT_TO_RIGHT = Form(), Form(passed=1)
-"""The two forms at their best, found among those in `benchmarks/structure.py`."""
+"""The two forms at their best, found among those of `benchmarks/structure.py`."""
 PSEUDO = 5
 """How many subgoals the expected spread counts as, where covariances are estimated: as in merging."""
 PATIENCE = 2
@@ -217,7 +217,7 @@ def gaussian_hmm(sequences, form=ERGODIC, seed=0, spread=0.15):
     Returns
     -------
     (L, 2) float array
-        In m.
+        In m; none where every model broke down.
 
     Raises
     ------
@@ -238,7 +238,7 @@ def gaussian_hmm(sequences, form=ERGODIC, seed=0, spread=0.15):
     # busy processor. Only what is loaded is limited: hmmlearn is, by now.
     with threadpool_limits(1):
         _, model = _least(lambda size: _best(shown, form, size, seed, spread), middle, most)
-        return model.means_[list(_common_path(model, shown))]
+        return model.means_[list(_common_path(model, shown))] if model else np.zeros((0, 2))
 
 
 def _least(found, middle, most):
@@ -345,13 +345,55 @@ def judge(found, task):
     return {"right_number": True, "right_order": in_order, "error": own.mean()}
 
 
+def task_of(task, seed):
+    """The true subgoals of a task, by its name or by their number.
+
+    Parameters
+    ----------
+    task : str or int
+        A name in `TASKS`; or the number K of subgoals of one that is drawn: each 1 to 2 m from the
+        one before, turning by up to 135 degrees, and no two nearer than 0.75 m, five times the
+        spread that methods expect.
+    seed : int
+        Of the draw.
+
+    Returns
+    -------
+    (K, 2) float array
+        In m.
+    """
+    if isinstance(task, str):
+        return np.array(TASKS[task])
+    random = np.random.default_rng([seed, task, 15])
+    places = np.zeros((0, 2))
+    while len(places) < task:
+        places = _next_place(places, random)
+    return places
+
+
+def _next_place(places, random):
+    """Places (M, 2) and one more; those before it alone, but for the first, if it comes too near."""
+    if not len(places):
+        return np.zeros((1, 2))
+    way = places[-1] - places[-2] if len(places) > 1 else np.ones(2)
+    angle = np.arctan2(way[1], way[0]) + random.uniform(-0.75, 0.75) * np.pi
+    drawn = places[-1] + random.uniform(1, 2) * np.array([np.cos(angle), np.sin(angle)])
+    if np.linalg.norm(places - drawn, axis=1).min() < APART:
+        return places[: max(len(places) - 1, 1)]
+    return np.vstack([places, drawn])
+
+
+APART = 0.75
+"""m between any two subgoals of a task that is drawn."""
+
+
 def study(tasks=TASKS, numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=range(100), methods=METHODS, jobs=1):
     """Let every method find every task from the same demonstrations, 30 % with a subgoal too many.
 
     Parameters
     ----------
-    tasks : iterable of str
-        Names in `TASKS`.
+    tasks : iterable of str or int
+        Names in `TASKS`, or numbers of subgoals, as for `task_of`.
     numbers : sequence of int
         Numbers of demonstrations.
     spreads : sequence of float
@@ -376,12 +418,13 @@ def study(tasks=TASKS, numbers=(2, 5, 10), spreads=(0.05, 0.15), seeds=range(100
 
 def _trial(task, n, spread, seed, method, find):
     """A row of the study: what one method makes of one set of demonstrations."""
-    demonstrations = draw_demonstrations(TASKS[task], n, spread, seed=seed)
+    truth = task_of(task, seed)
+    demonstrations = draw_demonstrations(truth, n, spread, seed=seed)
     begin = process_time()
     found = find(demonstrations)
     taken = process_time() - begin
     case = {"task": task, "n": n, "spread": spread, "seed": seed, "method": method}
-    return case | {"length": len(found)} | judge(found, TASKS[task]) | {"seconds": taken}
+    return case | {"length": len(found)} | judge(found, truth) | {"seconds": taken}
 
 
 def summary(table):
