@@ -277,7 +277,7 @@ def _blank(means, form, spread):
     logging.getLogger("hmmlearn").setLevel(logging.ERROR)  # it warns of every run that stops early
     size, steps = len(means), form.steps(len(means)).astype(float)
     kind = "spherical" if form.covariance == "told" else form.covariance
-    options = {"covariance_type": kind, "init_params": "", "implementation": "scaling", "n_iter": 100}
+    options = {"covariance_type": kind, "init_params": "", "n_iter": 100}
     options |= {"params": "stm" if form.covariance == "told" else "stmc"}
     pseudo = PSEUDO * spread**2
     one, shape = {"diag": (1, (size, 2)), "spherical": (1, size), "tied": (2, None)}[kind]
