@@ -2,7 +2,7 @@
 
 Which form an advocate of hmmlearn would choose: that with the largest share right in number and order from 2, 5 and 10
 demonstrations of the three tasks, subgoals scattering by the spread that is told, on development seeds from 2000 on; of
-those within 0.01 the most exact. Beside it, what is not chosen by: tasks of 8, 11 and 15 subgoals from two and from five
+those within 0.01 the most exact. Beside it, what is not chosen by: tasks of 8, 11 and 15 subgoals from two and five
 demonstrations, and subgoals that scatter twice as widely as is told. Errors in m, time in s of a core.
 TABLE
 """

@@ -18,12 +18,12 @@ import pandas as pd
 from tqdm import tqdm
 
 from dollop.cdhmm import SubgoalHMM
-from dollop.cdhmm.model import checked_sequence
-from dollop.checks import check_choice, check_positive, checked_whole, need
+from dollop.checks import check_choice, check_positive, checked_positions, checked_whole, need
 from dollop.lab.drawn import TASKS, draw_demonstrations
 
 __all__ = [
-    "ERGODIC", "Form", "LEFT_TO_RIGHT", "METHODS", "gaussian_hmm", "judge", "merged", "plain_mean", "study",
+    "ERGODIC", "Form", "LEFT_TO_RIGHT", "METHODS", "STARTS", "gaussian_hmm", "judge", "merged",
+    "plain_mean", "study",
     "summary", "task_of",
 ]  # fmt: skip
 
@@ -85,9 +85,10 @@ def _clusters(shown, size, random, weight=0.0):
 
     points, when = np.concatenate(shown), _when(shown)
     extent = weight * np.ptp(points, axis=0).max()
-    labels = KMeans(size, n_init=4, random_state=random).fit_predict(np.column_stack([points, extent * when]))
-    middles = [np.append(when[labels == k].mean(), points[labels == k].mean(axis=0)) for k in range(size)]
-    return np.array(sorted(middles, key=lambda middle: middle[0]))[:, 1:]
+    clusters = KMeans(size, n_init=4, random_state=random)
+    labels = clusters.fit_predict(np.column_stack([points, extent * when]))
+    order = np.argsort([when[labels == k].mean() for k in range(size)], kind="stable")
+    return np.array([points[labels == k].mean(axis=0) for k in order])
 
 
 def _random_start(shown, size, random):
@@ -184,13 +185,18 @@ class Form:
         return int(choices[0] + choices.sum() + 2 * size + COVARIANCES[self.covariance](size))
 
 
-COVARIANCES = {"told": lambda k: 0, "diag": lambda k: 2 * k, "spherical": lambda k: k, "tied": lambda k: 3}
+COVARIANCES = {
+    "told": lambda k: 0,
+    "diag": lambda k: 2 * k,
+    "spherical": lambda k: k,
+    "tied": lambda k: 3,
+}
 """How many free numbers the covariances of k states have."""
 CRITERIA = ("BIC", "AIC", "ICL")
 ERGODIC, LEFT_TO_RIGHT = Form(), Form(passed=1)
 """The two forms at their best, found among those of `benchmarks/structure.py`."""
 PSEUDO = 5
-"""How many subgoals the expected spread counts as, where covariances are estimated: as in merging."""
+"""How many subgoals the expected spread counts as where covariances are estimated, as in merging."""
 PATIENCE = 2
 """The search for the number of states ends after so many that are no better."""
 
@@ -228,11 +234,11 @@ def gaussian_hmm(sequences, form=ERGODIC, seed=0, spread=0.15):
     """
     need("baseline")
     check_positive("spread", spread)
-    if not len(sequences):
-        raise ValueError("sequences must hold at least one demonstration, got none")
+    if not len(sequences) or not all(map(len, sequences)):
+        raise ValueError("sequences must hold a demonstration at least, each of one subgoal at least")
     from threadpoolctl import threadpool_limits
 
-    shown = [checked_sequence(each, f"demonstration {k}") for k, each in enumerate(sequences)]
+    shown = [checked_positions(f"demonstration {k}", each) for k, each in enumerate(sequences)]
     middle, most = int(np.median([len(each) for each in shown])), sum(map(len, shown))
     # Matrices this small are slower with several BLAS threads, many times so where these wait for a
     # busy processor. Only what is loaded is limited: hmmlearn is, by now.
@@ -255,7 +261,7 @@ def _least(found, middle, most):
 
 
 def _best(shown, form, size, seed, spread):
-    """The best score of a number of states over all starts, inf where all broke down, and its model."""
+    """The best score over all starts, inf where all broke down, and its model."""
     random, points = np.random.RandomState(seed), np.concatenate(shown)
     best, lengths = (np.inf, None), [len(each) for each in shown]
     for start in form.starts:
@@ -271,22 +277,36 @@ def _best(shown, form, size, seed, spread):
 
 
 def _blank(means, form, spread):
-    """A model with its means where they start, narrow, and every step that it may take as likely."""
+    """A model before it learns: narrow, and every step that it may take as likely."""
     from hmmlearn.hmm import GaussianHMM
 
     logging.getLogger("hmmlearn").setLevel(logging.ERROR)  # it warns of every run that stops early
     size, steps = len(means), form.steps(len(means)).astype(float)
-    kind = "spherical" if form.covariance == "told" else form.covariance
-    options = {"covariance_type": kind, "init_params": "", "n_iter": 100}
-    options |= {"params": "stm" if form.covariance == "told" else "stmc"}
-    pseudo = PSEUDO * spread**2
-    one, shape = {"diag": (1, (size, 2)), "spherical": (1, size), "tied": (2, None)}[kind]
-    options |= {"covars_weight": PSEUDO + one, "covars_prior": pseudo * (np.eye(2) if kind == "tied" else 1)}
-    model = GaussianHMM(size, transmat_prior=1 + 1e-3 * steps, **options)
+    prior, covariances = _narrow(form.covariance, size, spread)
+    fitted = "stm" if form.covariance == "told" else "stmc"
+    expected = prior | {"transmat_prior": 1 + 1e-3 * steps}
+    model = GaussianHMM(size, n_iter=100, init_params="", params=fitted, **expected)
     model.transmat_ = steps / steps.sum(axis=1, keepdims=True)
     model.startprob_, model.means_ = model.transmat_[0], np.array(means)
-    model.covars_ = spread**2 * (np.eye(2) if kind == "tied" else np.ones(shape))
+    model.covars_ = covariances
     return model
+
+
+def _narrow(covariance, size, spread):
+    """What hmmlearn is to expect of covariances, as options, and those of the told spread."""
+    kind = "spherical" if covariance == "told" else covariance
+    # A covariance is (prior + sum of squares) / (weight - 1 + n), a tied one with 2 in place of 1.
+    one, shape = {
+        "diag": (1, np.ones((size, 2))),
+        "spherical": (1, np.ones(size)),
+        "tied": (2, np.eye(2)),
+    }[kind]
+    prior = PSEUDO * spread**2 * (np.eye(2) if kind == "tied" else 1)
+    return {
+        "covariance_type": kind,
+        "covars_weight": PSEUDO + one,
+        "covars_prior": prior,
+    }, spread**2 * shape
 
 
 def _score(model, points, lengths, form):
@@ -301,10 +321,15 @@ def _score(model, points, lengths, form):
 
 def _common_path(model, shown):
     """The states of the task in order, as most of the demonstrations go through them."""
-    paths = [[state for state, _ in groupby(model.predict(sequence))] for sequence in shown]
+    paths = [_path(model, sequence) for sequence in shown]
     visits = Counter(chain.from_iterable(map(set, paths)))
-    common = Counter(tuple(state for state in path if 2 * visits[state] > len(paths)) for path in paths)
+    task = {state for state, number in visits.items() if 2 * number > len(paths)}
+    common = Counter(tuple(filter(task.__contains__, path)) for path in paths)
     return min(common, key=lambda path: (-common[path], len(path), path))
+
+
+def _path(model, sequence):
+    return [state for state, _ in groupby(model.predict(sequence))]
 
 
 # ---- the comparison
@@ -372,7 +397,7 @@ def task_of(task, seed):
 
 
 def _next_place(places, random):
-    """Places (M, 2) and one more; those before it alone, but for the first, if it comes too near."""
+    """Places (M, 2) and one more; if it comes too near to one, it and the last are taken back."""
     if not len(places):
         return np.zeros((1, 2))
     way = places[-1] - places[-2] if len(places) > 1 else np.ones(2)

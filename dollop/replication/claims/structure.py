@@ -5,7 +5,7 @@ Beside merging stand hidden Markov models of hmmlearn, set up as their advocate 
 """
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from math import nan
 
@@ -33,7 +33,7 @@ WALKS = 4
 @claim(
     "V",
     "we must estimate the structure of the CDHMM from the demonstrations alone",
-    Criterion("merging_right", "share of tasks with number and order right", MOSTLY, 0.05, trials=1),
+    Criterion("merging_right", "share of tasks that are found", MOSTLY, 0.05, trials=1),
     Criterion("merging_right_2", "the same from two demonstrations", trials=1),
     Criterion("hmm_right", "ergodic HMM, five demonstrations: share right", trials=1),
     Criterion("hmm_right_2", "from two", trials=1),
@@ -42,7 +42,7 @@ WALKS = 4
     Criterion("merging_error_m", "error of a subgoal from five, where the number is right [m]"),
     Criterion("hmm_error_m", "of the ergodic HMM [m]"),
     Criterion("left_to_right_error_m", "of the left-to-right HMM [m]"),
-    Criterion("merging_typical", "walked: share with the walks' median number of subgoals", trials=1),
+    Criterion("merging_typical", "walked: share with as many as the median walk", trials=1),
     Criterion("hmm_typical", "of the ergodic HMM", trials=1),
     Criterion("left_to_right_typical", "of the left-to-right HMM", trials=1),
     Criterion("merging_off_m", "walked: subgoals found to the walks' own, mean distance [m]"),
@@ -75,10 +75,10 @@ def numbers_of(method, truth, drawn, walked, spread):
     """What a method makes of demonstrations that were drawn and walked."""
     name = NAMES[method]
     if method != "merging" and not find_spec("hmmlearn"):
-        return dict.fromkeys(
-            (f"{name}_{each}" for each in ("right", "right_2", "error_m", "typical", "off_m")), nan
-        )
-    five, two, again = (METHODS[method](shown, spread=spread) for shown in (drawn, drawn[:2], walked))
+        ends = ("right", "right_2", "error_m", "typical", "off_m")
+        return {f"{name}_{end}": nan for end in ends}
+    find = partial(METHODS[method], spread=spread)
+    five, two, again = map(find, (drawn, drawn[:2], walked))
     is_typical, off = typical(again, walked)
     return {
         f"{name}_right": float(judge(five, truth)["right_order"]),
@@ -119,11 +119,14 @@ def slaloms_again(seed):
     """The first slalom of a seed, and the same person walking it again in the same layout."""
     first, rng = recordings.slalom(0, seed), np.random.default_rng([seed, 21])
     noises = ([seed, 21, k] for k in range(WALKS - 1))
-    return [first, *(replace(first, walk=slalom_in(first.scene, rng), noise=noise) for noise in noises)]
+    return [
+        first,
+        *(replace(first, walk=slalom_in(first.scene, rng), noise=noise) for noise in noises),
+    ]
 
 
 def slalom_in(scene, rng):
-    """A slalom among the cones of a scene; one that comes too near to the background is walked anew."""
+    """A slalom among the cones of a scene, walked anew where it comes too near to the background."""
     for _ in range(100):
         try:
             return lab.slalom(scene, rng, **recordings.KEPT)

@@ -53,11 +53,22 @@ def figure_x2():
         draw_shares(axes[0], method, slalom[slalom.n.isin(FEW)], shift)
         draw_shares(axes[1], method, rows[rows.task != "slalom"], shift)
         draw_errors(axes[2], method, slalom, shift)
-    axes[2].plot(NUMBERS, expected_error(np.array(NUMBERS)), ":", color="black", label="expected of a mean of n")
+    axes[2].plot(
+        NUMBERS,
+        expected_error(np.array(NUMBERS)),
+        ":",
+        color="black",
+        label="expected of a mean of n",
+    )
     for ax in axes:
         ax.set(xlabel="demonstrations", xscale="log")
         ax.set_xticks((1, 2, 5, 10), ("1", "2", "5", "10"))
-    axes[0].set(title="slalom", ylabel="share with right number and order", ylim=(-0.03, 1.03), xlim=(1.6, 12.5))
+    axes[0].set(
+        title="slalom",
+        ylabel="share with right number and order",
+        ylim=(-0.03, 1.03),
+        xlim=(1.6, 12.5),
+    )
     axes[1].set(title="tasks of 8 to 15 subgoals", ylim=(-0.03, 1.03), xlim=(1.6, 6.3))
     axes[2].set(title="slalom", ylabel="mean error of a subgoal [m]", yscale="log")
     axes[2].set_yticks((0.05, 0.1, 0.2, 0.4), ("0.05", "0.1", "0.2", "0.4"))
@@ -68,12 +79,13 @@ def figure_x2():
 
 
 def found_by_all():
-    """The comparison of structure learners (`baseline.study`), on the slalom and longer tasks, a row each."""
+    """Structure learners compared (`baseline.study`), on the slalom and on longer tasks, a row each."""
     parts = []
-    for method, (_, _, numbers) in LINES.items():
+    for method, (_, _, shown) in LINES.items():
         learner = {method: baseline.METHODS[method]}
-        parts.append(baseline.study(("slalom",), numbers, (SPREAD,), range(SEEDS), learner, jobs=2))
-        parts.append(baseline.study(LONGER, FEW[:2], (SPREAD,), range(SEEDS_LONGER), learner, jobs=2))
+        parts.append(baseline.study(("slalom",), shown, (SPREAD,), range(SEEDS), learner, jobs=2))
+        asked = LONGER, FEW[:2], (SPREAD,), range(SEEDS_LONGER)
+        parts.append(baseline.study(*asked, learner, jobs=2))
     return pd.concat(parts)
 
 
@@ -99,7 +111,7 @@ def draw_errors(ax, method, rows, shift):
 
 
 def draw_points(ax, method, values, reach, shift):
-    """A point with its interval for each number of demonstrations, beside those of other methods."""
+    """A point with its interval for each number of demonstrations, beside those of others."""
     look = {"color": drawing.METHODS[method], "marker": LINES[method][1], "linestyle": "none"}
     ax.errorbar(values.index * shift, values, reach, label=method, **look)
 
