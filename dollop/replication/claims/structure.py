@@ -20,7 +20,7 @@ from dollop.replication.reconstruction import TOLD
 
 __all__ = ["typical"]
 
-NAMES = {"merging": "merging", "HMM, BIC": "hmm", "left-to-right HMM, BIC": "left_to_right"}
+NAMES = {"merging": "merging", "ergodic HMM": "hmm", "left-to-right HMM": "left_to_right"}
 """How the numbers of each method begin."""
 
 SUBGOALS = range(4, 16)

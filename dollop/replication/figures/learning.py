@@ -29,8 +29,8 @@ SEEDS, SEEDS_LONGER = 50, 7  # of the slalom; of each number of subgoals
 LINES = {  # method: name in metrics.json, marker, numbers of demonstrations
     "merging": ("merging", "o", NUMBERS),
     "plain mean": ("mean", "v", NUMBERS),
-    "HMM, BIC": ("hmm", "s", FEW),
-    "left-to-right HMM, BIC": ("left_to_right", "^", FEW),
+    "ergodic HMM": ("hmm", "s", FEW),
+    "left-to-right HMM": ("left_to_right", "^", FEW),
 }
 
 
@@ -44,7 +44,8 @@ def figure_x2():
     Dotted is the error to be expected of the mean of so many subgoals, which falls as one over the
     root of their number. The hidden Markov models are set up as their advocate would, and told the
     spread that merging is told. Left to right, stepping over one state at most, they do as well as
-    merging on the slalom; with steps that may lead anywhere they miss more of the longer tasks.
+    merging on the slalom; with steps that may
+    lead anywhere they miss many of the longer tasks from two demonstrations.
     """
     table = found_by_all()
     figure, axes = plt.subplots(1, 3, figsize=(12, 4))
