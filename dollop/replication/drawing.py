@@ -16,8 +16,8 @@ METHODS = {
     "robust": "#332288",  # indigo: what Dollop does by default, here ...
     "merging": "#332288",  # ... and here
     "plain mean": "#5F6B73",
-    "HMM, BIC": "#661100",  # browns: the two hidden Markov models
-    "left-to-right HMM, BIC": "#BF8B5E",
+    "ergodic HMM": "#661100",  # browns: the two hidden Markov models
+    "left-to-right HMM": "#BF8B5E",
     "anchored": "#332288",  # ways of learning: Dollop's default, the paper's ...
     "paper": "#999933",
     "TP-GMM": "#661100",  # ... and other people's

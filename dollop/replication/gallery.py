@@ -50,6 +50,7 @@ NAMES = {
     "seeds": ("seeds", ""),
     **{f"right_{n}": (f"{n} demonstrations: share right", "") for n in (2, 5, 10)},
     **{f"error_m_{n}": (f"{n} demonstrations: mean error", "m") for n in (2, 5, 10)},
+    **{f"longer_right_{n}": (f"tasks of 8 to 15 subgoals, {n} demonstrations: share right", "") for n in (2, 5)},
     "tasks": ("tasks", ""),
     **{
         f"error_percent_{n}": (

@@ -247,7 +247,7 @@ def test_fresh_demonstrations_are_merged_as_well_as_in_figure_x2():
         assert merging.right_order >= 0.9
         assert merging.error == pytest.approx(COMMITTED["x2"][f"merging_error_m_{n}"], rel=0.25)
         assert mean.right_order == pytest.approx(COMMITTED["x2"][f"mean_right_{n}"], abs=0.34)
-    one = baseline.study(("slalom",), (2,), (0.15,), (0,), {"HMM, BIC": baseline.gaussian_hmm})
+    one = baseline.study(("slalom",), (2,), (0.15,), (0,), {"ergodic HMM": baseline.gaussian_hmm})
     assert COMMITTED["x2"]["hmm_right_2"] == pytest.approx(one.right_order.mean(), abs=0.67)
 
 

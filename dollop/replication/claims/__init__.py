@@ -4,7 +4,7 @@ When a claim holds is told in `dollop.replication.claims.claim`.
 """
 
 # ruff: noqa: F401  (to import a module is to register its claims)
-from dollop.replication.claims import environment, foreground, law, learning, observing, premises, robot
+from dollop.replication.claims import environment, foreground, law, learning, observing, premises, robot, structure
 from dollop.replication.claims.claim import REGISTRY, Claim, Criterion
 
 __all__ = ["CLAIMS", "Claim", "Criterion"]
