@@ -2,6 +2,7 @@
 
 import ast
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
@@ -24,9 +25,9 @@ from dollop.replication.worlds.picture import draw_judged
 from dollop.replication.worlds.rooms import draw_room
 from dollop.replication.worlds.view import in_view, objects_in_view
 
-SEEDS = range(90_002, 90_002 + len(KINDS))
-SHORT = 90_007, 90_009
-"""Two worlds that are soon lived through: an object is moved, and there is none."""
+SEEDS = range(90_046, 90_046 + len(KINDS))
+SHORT = 90_046, 90_056
+"""Two worlds that are soon lived through: one is refused, one ends right."""
 
 
 @pytest.fixture(scope="module")
@@ -369,6 +370,7 @@ def test_the_command_writes_table_summary_and_pictures(tmp_path, fake, monkeypat
     pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
     monkeypatch.setattr(survey, "draw_sheet", lambda seeds, path: path.touch())
     monkeypatch.setattr(survey, "SEEDS", 12)
+    monkeypatch.setattr(survey, "run_survey", partial(survey.run_survey, jobs=0))
     report, folder = tmp_path / "REPLICATION.md", tmp_path / "study"
     report.write_text("<!-- worlds: begin -->\n<!-- worlds: end -->\n")
     main(["study", "worlds", "--seeds", "3", "--folder", str(folder)])
