@@ -11,6 +11,8 @@ export MPLBACKEND := Agg
 # The matrices here are tiny: more threads only get into each other's way, and cost up to five times the time.
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
+# What is compiled once need not be compiled anew by every worker, and by every process that a test starts.
+unexport PYTHONDONTWRITEBYTECODE
 
 FUZZ_FILES ?= 20000
 FUZZ_CALLS ?= 3000

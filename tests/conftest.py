@@ -13,6 +13,9 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("fresh", deadline=None)  # pytest --hypothesis-profile=fresh: new examples every time
 settings.load_profile("repeatable")
 
+COSTLY = {"fresh", "worlds", "followed", "wheel", "occupied"}
+"""Fixtures that take seconds: the tests that share one run in one worker, so that no other makes it again."""
+
 
 def pytest_make_parametrize_id(val, argname):
     """Name bytes after their argument: file content holds what changes, such as the time in a gzip's header."""
@@ -26,11 +29,13 @@ def pytest_xdist_auto_num_workers(config):
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what proves the paper, so that who works on the method can leave it out: pytest -m "not replication"."""
+    """Mark what proves the paper, for pytest -m "not replication", and what shares a costly fixture."""
     for item in items:
         inside = item.path.is_relative_to(ROOT)  # examples of an installed package are not
         if inside and "replication" in item.path.relative_to(ROOT).parts:
             item.add_marker(pytest.mark.replication)
+        if COSTLY.intersection(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,9 @@ import pytest
 from called import call
 from places import DATA
 
+from dollop import plot
+from dollop.cli import main
+
 LAB, EIGHTS, SLALOM = DATA / "lab.yaml", DATA / "figure_eights.log.gz", DATA / "slalom_0.log.gz"
 EMPTY, LOOK = DATA / "empty_lab.log.gz", DATA / "moved_cans_0.log.gz"
 
@@ -31,6 +34,25 @@ COMMANDS = {
 }
 
 
+@pytest.fixture
+def blank(monkeypatch):
+    """Pictures that nobody looks at take no time to draw."""
+    picture = plot.png(lambda ax: None)
+    monkeypatch.setattr(plot, "png", lambda draw, title=None: picture)
+
+
+@pytest.fixture(scope="module")
+def occupied(learned, tmp_path_factory):
+    """That folder with a map and a run more, as commands leave them."""
+    folder = tmp_path_factory.mktemp("occupied") / "room"
+    shutil.copytree(learned, folder)
+    main(["map", str(EMPTY), str(folder / "room.yaml")])
+    task, background = str(folder / "task.json"), str(folder / "lab.yaml")
+    main(["perform", task, "--map", background, "--out", str(folder / "run.csv")])
+    return folder
+
+
+@pytest.mark.usefixtures("blank")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_what_comes_next_replaces_nothing(command, room, capsys):
     """Said twice, and done each time: what was there is as it was, and so is what was written in between."""
@@ -65,14 +87,13 @@ def test_names_of_what_comes_next_are_those_of_the_file(room, capsys):
         (["show", "task.json", "--out", "run.png"], "run.csv"),
     ],
 )
-def test_the_picture_of_something_else_is_not_replaced(words, owner, room, capsys):
+def test_the_picture_of_something_else_is_not_replaced(words, owner, occupied, monkeypatch, capsys):
     """One line names the file that it belongs to, before the work, and nothing is written."""
-    call(capsys, "map", EMPTY, "room.yaml")
-    call(capsys, "perform", "task.json", "--map", "lab.yaml", "--out", "run.csv")
-    before = held(room)
+    monkeypatch.chdir(occupied)
+    before = held(occupied)
     said = call(capsys, *words)
     assert said.status == 1 and f"it is the picture of {owner}: choose another --out" in said.err
-    assert said.err.count("\n") == 1 and held(room) == before
+    assert said.err.count("\n") == 1 and held(occupied) == before
 
 
 @pytest.mark.parametrize("command", ["map", "learn", "perform", "observe", "show a task"])

@@ -2,6 +2,7 @@
 
 import ast
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
@@ -24,7 +25,9 @@ from dollop.replication.worlds.picture import draw_judged
 from dollop.replication.worlds.rooms import draw_room
 from dollop.replication.worlds.view import in_view, objects_in_view
 
-SEEDS = range(90_002, 90_002 + len(KINDS))
+SEEDS = range(90_046, 90_046 + len(KINDS))
+SHORT = 90_046, 90_056
+"""Two worlds that are soon lived through: one is refused, one ends right."""
 
 
 @pytest.fixture(scope="module")
@@ -320,13 +323,16 @@ def test_a_study_that_cannot_be_is_refused(tmp_path, arguments, message):
 # ---- the whole of it
 
 
-def test_the_chain_ends_alike_twice(tmp_path):
-    """Two worlds give the same rows in two runs, one of them on two processes."""
+def test_the_chain_ends_alike_twice_and_on_a_cluster(tmp_path):
+    """Two worlds give the same table in this process, on two others, and on a cluster named by its scheduler."""
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
     pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
-    one = survey.run_survey(SEEDS[7:9], tmp_path / "one.csv", jobs=1)
-    two = survey.run_survey(SEEDS[7:9], tmp_path / "two.csv", jobs=2)
-    assert one.equals(two)
-    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
+    here = survey.run_survey(SHORT, tmp_path / "here.csv", jobs=0)
+    two = survey.run_survey(SHORT, tmp_path / "two.csv", jobs=2)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        there = survey.run_survey(SHORT, tmp_path / "there.csv", cluster.scheduler_address)
+    assert here.equals(two) and here.equals(there)
+    assert len({(tmp_path / name).read_bytes() for name in ("here.csv", "two.csv", "there.csv")}) == 1
 
 
 def test_every_world_can_be_drawn(worlds):
@@ -340,16 +346,6 @@ def test_every_world_can_be_drawn(worlds):
             assert ax.get_title().startswith(str(world.seed)) and ax.patches
             ax.clear()
     plt.close(figure)
-
-
-def test_a_dask_cluster_finds_the_same(tmp_path):
-    """A study of worlds on a cluster, named by its scheduler, leaves the same table as one on this machine."""
-    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
-    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
-    here = survey.run_survey(SEEDS[7:8], tmp_path / "here.csv", jobs=1)
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        there = survey.run_survey(SEEDS[7:8], tmp_path / "there.csv", cluster.scheduler_address)
-    assert here.equals(there)
 
 
 def test_an_easy_world_ends_right():
@@ -374,6 +370,7 @@ def test_the_command_writes_table_summary_and_pictures(tmp_path, fake, monkeypat
     pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
     monkeypatch.setattr(survey, "draw_sheet", lambda seeds, path: path.touch())
     monkeypatch.setattr(survey, "SEEDS", 12)
+    monkeypatch.setattr(survey, "run_survey", partial(survey.run_survey, jobs=0))
     report, folder = tmp_path / "REPLICATION.md", tmp_path / "study"
     report.write_text("<!-- worlds: begin -->\n<!-- worlds: end -->\n")
     main(["study", "worlds", "--seeds", "3", "--folder", str(folder)])

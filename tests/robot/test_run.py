@@ -224,7 +224,7 @@ class Held(Trembling):
 
 def test_patience_ends_whatever_is_noticed():
     """A robot that is held fast gives up before the time-out."""
-    robot = Held((0.0, 0.0, 0.0), Limits(0.5, 8.0, 0.5, 20.0), period=0.2)
+    robot = Held((0.0, 0.0, 0.0), Limits(0.5, 8.0, 0.5, 20.0), period=0.5)
     run = perform(task(), robot, timeout=100.0, following=Following(patience=0.8))
     assert not run.finished and "no progress" in run.reason and run.t[-1] < 20
 
