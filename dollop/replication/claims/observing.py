@@ -514,13 +514,15 @@ def greedy(seed, how=TOLD):
     for name, n, scenes in (("sparse", 2, 4), ("dense", 12, 1)):
         rng = np.random.default_rng([seed, n])
         drawn = [crossing_walkers(n, rng) for _ in range(scenes)]
-        by_greedy, by_joint = (
-            np.mean([switches(*scene, tracker(matching=matching)) for scene in drawn])
-            for matching in ("greedy", "joint")
-        )
+        by_greedy, by_joint = (switches_among(drawn, tracker(matching=each)) for each in ("greedy", "joint"))
         numbers[f"{name}_greedy_per_min"] = by_greedy
         numbers[f"{name}_greedy_more_per_min"] = by_greedy - by_joint
     return numbers
+
+
+def switches_among(drawn, tracker):
+    """Mean over drawn scenes of `switches`."""
+    return np.mean([switches(*scene, tracker) for scene in drawn])
 
 
 def crossing_walkers(n, rng, side=6.0, duration=30.0, blob=0.4, noise=0.03):
