@@ -283,9 +283,9 @@ def counterintuitive(seed, layouts=10):
     nearer to where it was than any other is, so that everybody would match them alike. Who
     contrives moves them a little, keeps what makes the right matching less of the cheapest, and
     moves on, up to fifty times; or moves them in both layouts. Found: three corners or four of some
-    box go to another one. Not difficult: from every second layout, seen exactly, and with a fifth of the tries as a laser sees
-    them. Random moves, 0.4 m along each
-    axis (standard deviation), are told; seen inexactly: sides off by up to 50 mm.
+    box go to another one. Not difficult: from every second layout, seen exactly; and with a fifth
+    of the tries seen inexactly, as by a laser, their sides off by up to 50 mm. Random moves, 0.4 m
+    along each axis (standard deviation), are told.
     """
     rng = np.random.default_rng([seed, 7])
     tries = np.array([tries_to_contrive(rng) for _ in range(layouts)])
