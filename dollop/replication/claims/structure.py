@@ -26,7 +26,7 @@ NAMES = {"merging": "merging", "ergodic HMM": "hmm", "left-to-right HMM": "left_
 SUBGOALS = range(4, 16)
 """How many subgoals a task may have."""
 
-WALKS = 4
+WALKS = 3
 """Of one slalom in one layout."""
 
 
@@ -56,7 +56,7 @@ def structure(seed, how=TOLD):
     A task of 4 to 15 subgoals, drawn: 1 to 2 m from one to the next, no two nearer than 0.75 m. Five
     demonstrations that scatter by 0.15 m along each axis, one more subgoal that is no part of the
     task in 30 % of them; two of the five told beside it. Right is as many, each nearer to its own
-    true subgoal than to another; one in twenty matters. Walked: four slaloms in one layout, seen by
+    true subgoal than to another; one in twenty matters. Walked: three slaloms in one layout, seen by
     the laser and segmented each. They have no true subgoals: told is how often as many are found as
     the median walk has, and how far those found lie from the nearest of each walk's own. The hidden
     Markov models get the same demonstrations, and are told the same spread.

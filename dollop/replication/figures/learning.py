@@ -53,7 +53,7 @@ def figure_x2():
         slalom, shift = rows[rows.task == "slalom"], 1.06 ** (k - 1.5)
         draw_shares(axes[0], method, slalom[slalom.n.isin(FEW)], shift)
         draw_shares(axes[1], method, rows[rows.task != "slalom"], shift)
-        draw_errors(axes[2], method, slalom, shift)
+        draw_errors(axes[2], method, slalom, shift**0.25)
     axes[2].plot(
         NUMBERS,
         expected_error(np.array(NUMBERS)),
