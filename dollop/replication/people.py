@@ -5,8 +5,8 @@ variable DOLLOP_EXTERNAL_DATA names. They are
 
 - walks/: 110 people who cross a yard, seen by a drone (Yang et al., arXiv 1902.00487), already
   filtered there with constant velocity, so that accelerations are smaller than they were;
-- people/: three recordings of lasers at the height of legs (Leigh et al., ICRA 2015), one of them with
-  the person's place annotated in each scan.
+- people/: three recordings of lasers at the height of legs (Leigh et al., ICRA 2015), in one of
+  which somebody has marked where the person is.
 
 What is measured of real people is measured of simulated ones by the same lines of code, and the two
 are never put into one number. No verdict hangs on either.
@@ -44,8 +44,10 @@ from dollop.tracking import (
 )
 
 __all__ = [
-    "DATA", "HIDDEN", "Number", "Seen", "command", "errors_when_hidden", "folder_of_recordings", "gap_errors",
-    "local_noise", "numbers", "people_table", "predictions", "seen_of", "simulated_walks", "states_of",
+    "DATA", "HIDDEN", "NOISE", "NOISES", "Number", "PERIOD", "Seen", "annotated", "best_motion",
+    "command", "errors_when_hidden", "even_walk", "folder_of_recordings", "gap_errors",
+    "hidden_people", "local_noise", "numbers", "people_table", "predictions", "publish", "seen_of",
+    "simulated_walks", "states_of", "stretches",
 ]  # fmt: skip
 
 DATA = "DOLLOP_EXTERNAL_DATA"
@@ -58,8 +60,8 @@ PERIOD, FIRST, EVERY = 0.1, 2.0, 1.0
 """s: between positions; what is seen of a walker before it is hidden; and between two hidings."""
 
 NOISES = tuple(np.geomspace(1e-5, 1e3, 25))
-"""Noises of the motion models that are tried, in m^2/s^(2 order - 1): people who cross a yard walk more
-evenly than the claims' `NOISES` can say, and who is seen without noise less so."""
+"""Noises of the motion models that are tried, in m^2/s^(2 order - 1): more than the claims try, for
+people who cross a yard walk more evenly than those can say."""
 
 NOISE = 0.028
 """m per axis: that of the centroids in the simulation (`centroid`)."""
@@ -74,7 +76,10 @@ NEARER = 0.2
 """m: what is so much nearer than a beam's usual reading does not stand there."""
 
 FEWEST, HALF_SECOND, STRETCH = 2, 0.5, 10.0
-"""Readings that make a centroid; s on either side of a smooth piece of way; s of a stretch of walk."""
+"""Readings that make a centroid; s on either side of a smooth piece of way; s of a stretch."""
+
+LONG = 30.0
+"""s for which somebody is followed before a standing laser who counts."""
 
 WALKERS = 40
 """Simulated figure-eights beside the 110 walks; the first five are seen by the laser as well."""
@@ -246,7 +251,7 @@ def standing(mean, steps, motion):
 
 
 def hidings(walk, steps):
-    """The last scans before somebody is hidden for so many: once a second, as often as it can be."""
+    """The last scans before somebody is hidden for so many, once a second."""
     return np.arange(round(FIRST / PERIOD), len(walk) - steps, round(EVERY / PERIOD))
 
 
@@ -300,7 +305,7 @@ def particle_errors(walks, shown, motion, steps):
 
 
 def best_motion(walks, shown, order):
-    """The motion model whose noise predicts these people best, all times of being hidden together."""
+    """The motion model whose noise predicts these people best, all times hidden together."""
     models = [Motion(order, noise) for noise in NOISES]
     totals = np.zeros(len(models))
     for k, model in enumerate(models):
@@ -334,8 +339,8 @@ def hidden_people(walks, noise=0.0):
     """
     rng = np.random.default_rng(0)
     shown = [walk + rng.normal(0.0, noise, walk.shape) if noise else walk for walk in walks]
-    found = [_half_hidden(walks, shown, half) for half in (0, 1)]
-    return {key: np.hstack([each[key] for each in found]) for key in found[0]}
+    first, second = (_half_hidden(walks, shown, half) for half in (0, 1))
+    return {key: np.hstack([first[key], second[key]]) for key in first}
 
 
 def _half_hidden(walks, shown, half):
@@ -377,7 +382,7 @@ COMPARED = (
         ("velocity", 1),
     ),
 )
-"""Claim, number, its meaning, whose errors (0) or misses (1) it is of, and whose it is compared with."""
+"""Claim, number, meaning, whose errors (0) or misses (1) it is of, and minus whose."""
 
 
 def numbers_hidden(walks, noise, **what):
@@ -445,7 +450,7 @@ def seen_of(log, t, places, rows=None):
 
 
 def stretches(seen):
-    """A walk of 10 s after the other, each seen in nine of ten scans and moving by a metre or more."""
+    """Walks of 10 s, one after the other, seen in nine of ten scans and moving by a metre."""
     found = []
     for begin in np.arange(seen.t[0], seen.t[-1] - STRETCH, STRETCH):
         rows = (seen.t >= begin) & (seen.t < begin + STRETCH)
@@ -513,7 +518,8 @@ def followed(path):
     """People before a laser that stands still, followed from scan to scan: list of Seen."""
     log = read_log(path)
     people = observe(log, OccupancyGrid.from_log(log)).people
-    return [seen_of(log, person.t, person.positions) for person in people if person.t[-1] - person.t[0] > 30.0]
+    long = [person for person in people if person.t[-1] - person.t[0] > LONG]
+    return [seen_of(log, person.t, person.positions) for person in long]
 
 
 def annotated(path, scans="/scan_base2", places="/ground_truth_people_tracks"):
@@ -527,7 +533,8 @@ def annotated(path, scans="/scan_base2", places="/ground_truth_people_tracks"):
         log = read_log(bag, topic=scans)
         times, marked = _marked(bag, scans, places)
     if len(times) != len(log):
-        raise FormatError(f"the bag must hold a scan for each of {len(times)} messages, got {len(log)}", path)
+        problem = f"of {len(times)} scans all must be readable, got {len(log)}"
+        raise FormatError(problem, path)
     rows = np.searchsorted(times, marked[:, 0]) - 1
     kept = np.flatnonzero((rows >= 0) & (np.diff(rows, append=len(times)) > 0))
     return [seen_of(log, log.t[rows[kept]], marked[kept, 1:], rows[kept])]
@@ -551,7 +558,7 @@ def _marked(bag, scans, places):
 
 
 def simulated_before_the_laser(body, count=5):
-    """Simulated people in the paper's laboratory, who walk five figure-eights each: list of Seen."""
+    """Simulated people who walk five figure-eights each in the paper's laboratory: list of Seen."""
     from dollop.lab import record_figure_eights
     from dollop.replication import recordings
 
