@@ -17,7 +17,7 @@ CODE = sorted((ROOT / "dollop").rglob("*.py"))
 DISTRIBUTIONS = {"PIL": "pillow", "yaml": "pyyaml"}  # where the two names differ
 PLACES = {  # where an extra may be imported
     "lab": "dollop/lab/engine.py",
-    "ros": "dollop/formats/ros_bag",
+    "ros": ("dollop/formats/ros_bag", "dollop/replication/people.py"),
     "baseline": "dollop/replication/baseline.py",
     "peers": "dollop/replication/peers.py",
     "cluster": "dollop/replication/running.py",

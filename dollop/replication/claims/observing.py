@@ -1,14 +1,16 @@
 """Claims on observing the user: filtering, predicting and matching foreground objects (Sec. II).
 
 The paper's sentences are about the paper's way of observing, so all of these observe as it does:
-method="paper", where a position is the centroid of a blob and any foreground object may be the user.
+method="paper", where a position is the centroid of a blob and any foreground object may be the
+user.
 
-The laser sees the near side of a walker only, so that centroids lie nearer to it than the middle of
-the body, by a distance that hardly varies. Where a claim is about noise, or compares two ways of
-predicting the centroids to come, this bias is taken out: an estimate is compared with the place where
-a centroid is expected, the true place moved towards the sensor by the mean bias of that recording.
-Each such claim says so, and tells its number with the bias left in, in one that ends in "biased".
-Where a claim is about where the user was, the bias is an error like any other and stays in.
+The laser sees the near side of a walker only, so that centroids lie nearer to it than the middle
+of the body, by a distance that hardly varies. Where a claim is about noise, or compares two ways
+of predicting the centroids to come, this bias is taken out: an estimate is compared with the
+place where a centroid is expected, the true place moved towards the sensor by the mean bias of
+that recording. Each such claim says so, and tells its number with the bias left in, in one that
+ends in "biased". Where a claim is about where the user was, the bias is an error like any other
+and stays in.
 
 Smallest differences that matter: 0.002 m in a track, a tenth of the paper's own 20 mm; 0.01 m in a
 prediction of somebody hidden, who is looked for within half a metre; 0.05 m/s, a twentieth of a
@@ -47,7 +49,7 @@ from dollop.tracking import (
 )
 from dollop.trajectory import distance_to_polyline
 
-__all__ = ["NOISES", "causal_states", "centroid_noise", "choose_noises", "standing_still"]
+__all__ = ["causal_states", "choose_noises"]
 
 SEEN, FILTERED = ("laser_noise", "walker"), ("laser_noise", "walker", "motion_noise")
 """Choices on which what the laser sees depends, and what is made of it."""
@@ -106,10 +108,10 @@ def expected_centroids(user, recording, t=None):
 def filter_(seed, how=TOLD):
     """How much nearer to the truth the Kalman filter is than the centroids, in place and velocity.
 
-    Five figure-eights while the walker is in sight: estimates from the scans so far. The near-side
-    bias is taken out, for it is no noise and no filter can know of it. The filter is of use if it is
-    nearer by 2 mm, a tenth of what the paper calls a small error, and its velocity by a twentieth of
-    a walker's.
+    Five figure-eights while the walker is in sight: estimates from the scans so far. The
+    near-side bias is taken out, for it is no noise and no filter can know of it. The filter is of
+    use if it is nearer by 2 mm, a tenth of what the paper calls a small error, and its velocity
+    by a twentieth of a walker's.
     """
     user, recording = walked(seed, how)
     expected, true = expected_centroids(user, recording), true_places(user.t, recording)
@@ -287,12 +289,12 @@ def standing_still(i, means, covariances, F, Q):
 def prediction(seed, how=TOLD):
     """Predictions of a walker behind the cans, by the Kalman filter and by particles.
 
-    From the scans before, by the filter, by 200 particles that die where the laser would have seen
-    them, and by blind ones that do not. The near-side bias is taken out: what is predicted is the next
-    centroid. Position and velocity, each with the noise that suits it best behind the cans, chosen on
-    ten other seeds. Missed: 0.5 m off or more in the last scan before the walker reappears, so that it
-    is taken for somebody new. Who looks for somebody within half a metre does not mind 1 cm; one
-    walker of twenty is minded.
+    From the scans before, by the filter, by 200 particles that die where the laser would have
+    seen them, and by blind ones that do not. The near-side bias is taken out: what is predicted
+    is the next centroid. Position and velocity, each with the noise that suits it best behind the
+    cans, chosen on ten other seeds. Missed: 0.5 m off or more in the last scan before the walker
+    reappears, so that it is taken for somebody new. Who looks for somebody within half a metre
+    does not mind 1 cm; one walker of twenty is minded.
     """
     user, recording = walked(seed, how)
     expected, true = expected_centroids(user, recording), true_places(user.t, recording)
@@ -372,9 +374,9 @@ def velocity(seed, how=TOLD):
     """Errors of predicting a hidden walker with velocity, with acceleration as well, with neither.
 
     A walker behind the cans, and one whose centroids are taken away for one second in four; from
-    the scans before. The near-side bias is taken out: what is predicted is the next centroid. Each
-    motion model with the noise that suits it best, chosen on ten other seeds. Who looks for somebody
-    within half a metre does not mind 1 cm.
+    the scans before. The near-side bias is taken out: what is predicted is the next centroid.
+    Each motion model with the noise that suits it best, chosen on ten other seeds. Who looks for
+    somebody within half a metre does not mind 1 cm.
     """
     walk, numbers = walked(seed, how), {}
     for name, hide in (("cans", behind_cans), ("anywhere", now_and_then)):
@@ -402,8 +404,9 @@ def velocity(seed, how=TOLD):
 def straight(seed, how=TOLD):
     """How far Kalman predictions of a walker behind the cans are from a straight line.
 
-    Position and velocity; beside them the walker's own way meanwhile. Straight: within 2 mm, a tenth
-    of the error that the paper calls small, give or take 1 mm. The near-side bias bends nothing.
+    Position and velocity; beside them the walker's own way meanwhile. Straight: within 2 mm, a
+    tenth of the error that the paper calls small, give or take 1 mm. The near-side bias bends
+    nothing.
     """
     user, recording = walked(seed, how)
     predicted = causal_states(user.t, user.measurements, motion_of(how))[:, 0]
@@ -505,10 +508,10 @@ def greedy(seed, how=TOLD):
     """Identity switches with greedy and with joint matching, among two walkers and among twelve.
 
     Walkers at 1 m/s on smooth random ways through a square of 6 m, without the laser: centroids
-    with 30 mm noise, one for those nearer to each other than 0.4 m; two walkers in four such scenes,
-    twelve in one. A switch: a walker goes on under another track. A demonstration takes about a
-    minute, and a switch spoils it. Well: nine of ten are not spoiled. One of twenty matters. Nothing
-    is compared with a place here, and there is no near-side bias.
+    with 30 mm noise, one for those nearer to each other than 0.4 m; two walkers in four such
+    scenes, twelve in one. A switch: a walker goes on under another track. A demonstration takes
+    about a minute, and a switch spoils it. Well: nine of ten are not spoiled. One of twenty
+    matters. Nothing is compared with a place here, and there is no near-side bias.
     """
     tracker, numbers = partial(Tracker, motion=motion_of(how)), {}
     for name, n, scenes in (("sparse", 2, 4), ("dense", 12, 1)):
@@ -701,12 +704,12 @@ def stroll(scene, rng, rounds=16, speed=0.5, **gait):
 def loss(seed, how=TOLD):
     """How often a lap loses the user, who is then found again.
 
-    The tracks of `interpolation`, cut at five equal times. Lost in a lap: the user goes on as another
-    track, or the track that is plotted has an outlying line, half a metre or more from the true middle
-    of the walker, the near-side bias left in. That it happened once is an anecdote, and nothing in it
-    can be wrong; claimed is that it happens: to one lap of twenty at least, as one of five would be a
-    rare chance where it happens less often. Temporarily: as each walk is found again by how it is
-    observed, this is not judged.
+    The tracks of `interpolation`, cut at five equal times. Lost in a lap: the user goes on as
+    another track, or the track that is plotted has an outlying line, half a metre or more from
+    the true middle of the walker, the near-side bias left in. That it happened once is an
+    anecdote, and nothing in it can be wrong; claimed is that it happens: to one lap of twenty at
+    least, as one of five would be a rare chance where it happens less often. Temporarily: as each
+    walk is found again by how it is observed, this is not judged.
     """
     shown = recordings.figure_eights(seed, how)
     user, recording = walked(seed, how)

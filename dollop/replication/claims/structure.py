@@ -4,18 +4,16 @@ Beside merging stand hidden Markov models of hmmlearn, set up as their advocate 
 (`dollop.replication.baseline`). Where hmmlearn is missing, what is theirs is nan.
 """
 
-from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 from importlib.util import find_spec
 from math import nan
 
 import numpy as np
 
-from dollop import lab
 from dollop.lab.drawn import draw_demonstrations
-from dollop.replication import recordings
 from dollop.replication.baseline import METHODS, judge, task_of
 from dollop.replication.claims.claim import MOSTLY, Criterion, claim
+from dollop.replication.claims.walked import walks_again
 from dollop.replication.reconstruction import TOLD
 
 __all__ = ["typical"]
@@ -63,7 +61,7 @@ def structure(seed, how=TOLD):
     """
     truth = task_of(int(np.random.default_rng([seed, 15]).choice(SUBGOALS)), seed)
     drawn = draw_demonstrations(truth, 5, TOLD.spread, seed=[seed, 22])
-    walked = [each.demonstration.law.subgoals for each in slaloms_again(seed)]
+    walked = [each.demonstration.law.subgoals for each in walks_again(seed)[:WALKS]]
     return {
         number: value
         for method in NAMES
@@ -112,24 +110,3 @@ def typical(found, walked):
         return number, nan
     gaps = [np.linalg.norm(found[:, None] - each, axis=-1).min(axis=1).mean() for each in walked]
     return number, float(np.mean(gaps))
-
-
-@lru_cache(maxsize=2)
-def slaloms_again(seed):
-    """The first slalom of a seed, and the same person walking it again in the same layout."""
-    first, rng = recordings.slalom(0, seed), np.random.default_rng([seed, 21])
-    noises = ([seed, 21, k] for k in range(WALKS - 1))
-    return [
-        first,
-        *(replace(first, walk=slalom_in(first.scene, rng), noise=noise) for noise in noises),
-    ]
-
-
-def slalom_in(scene, rng):
-    """A slalom among the cones of a scene, walked anew where it comes too near to the background."""
-    for _ in range(100):
-        try:
-            return lab.slalom(scene, rng, **recordings.KEPT)
-        except ValueError:
-            continue
-    raise RuntimeError("no slalom with room in 100 draws")
