@@ -28,6 +28,7 @@ def pytest_xdist_auto_num_workers(config):
     return 0 if all(Path(each.split("::")[0]).is_file() for each in config.args) else None
 
 
+@pytest.hookimpl(tryfirst=True)  # xdist reads the groups in the same hook
 def pytest_collection_modifyitems(items):
     """Mark what proves the paper, for pytest -m "not replication", and what shares a costly fixture."""
     for item in items:

@@ -4,6 +4,7 @@ from string import ascii_lowercase
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 from dollop import plot
 from dollop.environment import Environment, spring_constants, spring_forces
@@ -201,7 +202,7 @@ def figure_x1():
     and cones that the simulated laser sees, each layout matched to the first: a laser sees one side
     of a can and is off by some centimetres.
     """
-    shares = matching_shares(noises=NOISES, layouts=300, seed=recordings.SEED)
+    shares = pd.concat(at_once(shares_of, [(noise,) for noise in NOISES]))
     seen = at_once(recordings.matchings_from_laser, [("cans",), ("cones",)])
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), width_ratios=(2, 1), sharey=True)
     draw_shares_by_noise(left, shares)
@@ -213,6 +214,11 @@ def figure_x1():
     for kind, share in zip(("cans", "cones"), seen, strict=True):
         measured |= {f"{method}_{kind}_seen": right for method, right in share.items()}
     return figure, measured
+
+
+def shares_of(noise):
+    """How often corners are matched right at one noise in m."""
+    return matching_shares(noises=(noise,), layouts=300, seed=recordings.SEED)
 
 
 def draw_shares_by_noise(ax, shares):
