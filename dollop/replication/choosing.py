@@ -403,7 +403,8 @@ def reweighed(association, how):
         return association
     squares = (association.differences**2).sum(axis=2)
     weights = association.weights * (squares + KNOWN_TO**2) ** (1 - how.weights / 2)
-    far = squares.argsort(axis=1, kind="stable").argsort(axis=1, kind="stable") >= how.corners
+    order = np.where(weights > 0, squares, np.inf).argsort(axis=1, kind="stable")
+    far = order.argsort(axis=1, kind="stable") >= how.corners
     weights = np.where(far, 0.0, weights)
     return replace(association, weights=weights / weights.sum(axis=1, keepdims=True))
 

@@ -153,7 +153,7 @@ def work(job, claims=CLAIMS):
     id, name, seed = job
     try:
         found = claims[id].experiment(int(seed), how_of(name))
-    except (ValueError, RuntimeError) as error:  # refused, as a tolerance that cannot be kept
+    except Exception as error:  # an outcome of its own, as a tolerance that cannot be kept
         return {"numbers": f"{RAISED}{type(error).__name__}: {shortened(str(error), 200)}"}
     values = ((each.number, float(found[each.number])) for each in judged(claims[id]))
     return {"numbers": " ".join(f"{name}={value:.6g}" for name, value in values)}
@@ -231,8 +231,7 @@ def run_universes(hows, seeds, path, scheduler=None, claims=CLAIMS, jobs=-1):
     Raises
     ------
     RuntimeError
-        If experiments failed for another reason than that their universe does not allow them, or
-        killed their workers. All that was finished is in the table.
+        If experiments killed their workers, or had no end. All that was finished is in the table.
     FormatError
         If the file is something else.
     """
@@ -304,7 +303,8 @@ def summary(rows, hows, claims=CLAIMS, results=None):
     Returns
     -------
     dict
-        "universes", "seeds" and "claims": for each claim what `of_claim` tells.
+        "universes", "seeds", "raised" (the number of experiments without an answer by the kind of
+        their errors) and "claims": for each claim what `of_claim` tells.
     """
     claims, found = choosy(claims), {}
     for row in rows:
@@ -319,9 +319,15 @@ def summary(rows, hows, claims=CLAIMS, results=None):
     return {
         "universes": len(hows),
         "seeds": [seeds[0], seeds[-1]],
-        "refused": sum(row["numbers"].startswith(RAISED) for row in rows),
+        "raised": dict(Counter(filter(None, map(raised, rows)))),
         "claims": told,
     }
+
+
+def raised(row):
+    """The kind of error that a line's universe ended in; nothing if it gave numbers."""
+    _, found, why = row["numbers"].partition(RAISED)
+    return why.partition(":")[0] if found else ""
 
 
 def of_claim(claim, hows, verdicts):

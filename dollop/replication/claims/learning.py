@@ -298,9 +298,12 @@ def shared(seed, how=TOLD):
     if slaloms(seed, how.only(LEARNED)) is None:
         return numbers
     for ours, found in by_paper_and_ours(seed, how):
-        both, *alone = walked_errors(found)
-        numbers |= {f"both{ours}_m": both, f"alone_more{ours}_m": np.mean(alone) - both}
+        if found is not None:
+            both, *alone = walked_errors(found)
+            numbers |= {f"both{ours}_m": both, f"alone_more{ours}_m": np.mean(alone) - both}
     found = slaloms(seed, replace(how, learning="paper").only(LEARNED))
+    if found is None:
+        return numbers
     laws = [with_own_lds(found.both, found.shown, d) for d in range(len(found.shown))]
     own = [error_of(law, found.kept.walks) for law in laws]
     return numbers | {"own_lds_more_m": np.mean(own) - walked_errors(found)[0]}
