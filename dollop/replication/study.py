@@ -26,8 +26,10 @@ from dollop.replication.claims.observing import choose_noises
 from dollop.replication.fingerprint import fingerprint, fingerprint_of_text
 from dollop.replication.judging import FAMILY, LEVEL
 from dollop.replication.ledger import NOT_DONE, Ledger
+from dollop.replication.people import command as measure_people
 from dollop.replication.report import publish
 from dollop.replication.running import as_json, going_on_in, report_beside, run_all
+from dollop.replication.universes import command as survey_universes
 from dollop.replication.worlds.survey import command as survey_worlds
 
 __all__ = ["command", "read_table"]
@@ -322,5 +324,10 @@ def check_frozen(ids, seeds, path):
         raise ValueError(f"{told}; with --folder others can be looked at")
 
 
-OTHERS = {"criteria": freeze, "worlds": survey_worlds}
+OTHERS = {
+    "criteria": freeze,
+    "universes": survey_universes,
+    "people": measure_people,
+    "worlds": survey_worlds,
+}
 """What `dollop study` does beside the claims, each a study of its own."""

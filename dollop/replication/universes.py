@@ -41,7 +41,7 @@ __all__ = [
     "verdict_of", "work",
 ]  # fmt: skip
 
-COUNT, SEEDS = 120, 10
+COUNT, FIRST_SEED, SEEDS = 120, 1000, 10
 QUICK_COUNT, QUICK_SEEDS = 31, 2
 SEED = 2004
 """Of the combinations, and of the draws that tell what chance does."""
@@ -506,17 +506,16 @@ def command(options):
         When interrupted, with the words where it goes on.
     """
     seeds = (QUICK_SEEDS if options.quick else SEEDS) if options.seeds is None else options.seeds
-    if seeds < 1 or not 0 <= options.first_seed <= 2**31 - seeds:
-        told = f"got {seeds} from {options.first_seed} on"
-        raise ValueError(f"universes need a seed or more, from 0 on, {told}")
+    first = FIRST_SEED if options.first_seed is None else options.first_seed
+    if seeds < 1 or not 0 <= first <= 2**31 - seeds:
+        raise ValueError(f"universes need a seed or more, from 0 on, got {seeds} from {first} on")
     need("lab")
     folder = options.folder or Path("study-quick" if options.quick else "study")
     folder.mkdir(parents=True, exist_ok=True)
     path, hows = folder / "universes.csv", universes(QUICK_COUNT if options.quick else COUNT)
     check_writable(path)
     with going_on_in(path):
-        numbers = range(options.first_seed, options.first_seed + seeds)
-        rows = run_universes(hows, numbers, path, options.scheduler)
+        rows = run_universes(hows, range(first, first + seeds), path, options.scheduler)
     publish(summary(rows, hows, results=folder / "results.csv"), folder, whole=not options.quick)
 
 
