@@ -14,7 +14,7 @@ WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 CODE = sorted((ROOT / "dollop").rglob("*.py"))
-DISTRIBUTIONS = {"PIL": "pillow", "yaml": "pyyaml"}  # where the two names differ
+DISTRIBUTIONS = {"sklearn": "scikit-learn", "PIL": "pillow", "yaml": "pyyaml"}  # where the two names differ
 PLACES = {  # where an extra may be imported
     "lab": "dollop/lab/engine.py",
     "ros": ("dollop/formats/ros_bag", "dollop/replication/people.py"),

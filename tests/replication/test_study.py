@@ -26,6 +26,7 @@ from dollop.replication.claims import (
     robot,
 )
 from dollop.sequenced_lds import SequencedLDS
+from dollop.tracking import Tracker
 
 
 def claim_of(experiment):
@@ -424,9 +425,9 @@ def test_walkers_far_apart_are_never_switched(matching):
     t = np.arange(0, 6.05, 0.1)
     objects = [np.array([[x, 0.0], [x, 4.0]]) for x in t]
     alone = np.tile([0, 1], (len(t), 1))
-    assert observing.switches(t, objects, alone, matching) == 0
+    assert observing.switches(t, objects, alone, Tracker(matching=matching)) == 0
     alone[30:] = [1, 0]
-    assert observing.switches(t, objects, alone, matching) == pytest.approx(10.0)
+    assert observing.switches(t, objects, alone, Tracker(matching=matching)) == pytest.approx(10.0)
 
 
 def test_walkers_that_coincide_are_one_centroid():
