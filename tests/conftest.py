@@ -13,8 +13,8 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("fresh", deadline=None)  # pytest --hypothesis-profile=fresh: new examples every time
 settings.load_profile("repeatable")
 
-COSTLY = {"fresh", "worlds", "followed", "wheel", "occupied"}
-"""Fixtures that take seconds: the tests that share one run in one worker, so that no other makes it again."""
+TOGETHER = "test_claims.py", "test_worlds.py", "test_readme.py", "test_package.py", "test_cli_naming.py"
+"""Files with a fixture that takes seconds: one worker runs all of each, so that no other makes it again."""
 
 
 def pytest_make_parametrize_id(val, argname):
@@ -28,15 +28,25 @@ def pytest_xdist_auto_num_workers(config):
     return 0 if all(Path(each.split("::")[0]).is_file() for each in config.args) else None
 
 
-@pytest.hookimpl(tryfirst=True)  # xdist reads the groups in the same hook
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Tests go to whichever worker is free, one by one; the files named above as a whole, and first."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Scheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            file = nodeid.split("::")[0]
+            return file if file.endswith(TOGETHER) else nodeid
+
+    return Scheduling(config, log)
+
+
 def pytest_collection_modifyitems(items):
-    """Mark what proves the paper, for pytest -m "not replication", and what shares a costly fixture."""
+    """Mark what proves the paper, so that who works on the method can leave it out: pytest -m "not replication"."""
     for item in items:
         inside = item.path.is_relative_to(ROOT)  # examples of an installed package are not
         if inside and "replication" in item.path.relative_to(ROOT).parts:
             item.add_marker(pytest.mark.replication)
-        if COSTLY.intersection(getattr(item, "fixturenames", ())):
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 @pytest.fixture(scope="session")
