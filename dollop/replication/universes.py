@@ -459,8 +459,8 @@ def draw_figure(found, path):
 
 def draw_grid(figure, ax, grid, names, found):
     """The map: how much each choice lowers the share; a dot where it flips a verdict alone."""
-    ax.set_facecolor("0.93")
-    image = ax.imshow(grid, cmap="cividis_r", vmin=0, vmax=1, aspect="auto")
+    ax.set_facecolor("0.85")
+    image = ax.imshow(grid, cmap="Blues", vmin=0, vmax=1, aspect="auto")
     labels = [name.replace("_", " ") for name in names]
     ax.set_xticks(range(len(names)), labels, rotation=60, ha="right")
     ax.set_yticks(range(len(grid)), list(found["claims"]))

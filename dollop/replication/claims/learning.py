@@ -342,8 +342,10 @@ def generalize(seed, how=TOLD):
     """
     if slaloms(seed, how.only(LEARNED)) is None:
         return unknown("generalize") | {"refused": 1.0}
-    numbers, grid = {"refused": 0.0}, recordings.background_map()
+    numbers, grid = unknown("generalize") | {"refused": 0.0}, recordings.background_map()
     for ours, found in by_paper_and_ours(seed, how):
+        if found is None:
+            return numbers
         rng = np.random.default_rng([seed, 20])
         (start,) = recordings.starts_near_the_beginning(found.both, 1, rng)
         numbers[f"sides_right{ours}"] = sides_right(found)
