@@ -113,7 +113,7 @@ def run_study(ids, seeds, table_path, scheduler=None, claims=CLAIMS, jobs=-1):
         If the file is something else.
     """
     stamps = {id: stamp(claim) for id, claim in claims.items()}
-    refuse_judged(ids, seeds, table_path, stamps)
+    refuse_judged(ids, seeds, table_path, {id: each["criteria"] for id, each in stamps.items()})
 
     def answers(row):
         made = all(row[key] == value for key, value in stamps.get(row["claim"], NEVER).items())
@@ -135,12 +135,12 @@ NEVER = {"code": None}
 """The stamp of a claim that is none any more: no line has it."""
 
 
-def refuse_judged(ids, seeds, table_path, stamps):
+def refuse_judged(ids, seeds, table_path, criteria):
     """Refuse seeds that have judged one of these claims under other criteria, in this study or the first."""
     rows = chain.from_iterable(ledger_at(path).read()[0] for path in (table_path, table_path.with_name(FIRST)))
     asked = {(id, str(seed)) for id in ids for seed in seeds}
     judged = [row for row in rows if (row["claim"], row["seed"]) in asked and numbers_of(row)]
-    other = [row for row in judged if row["criteria"] != stamps[row["claim"]]["criteria"]]
+    other = [row for row in judged if row["criteria"] != criteria[row["claim"]]]
     if other:
         names, used = sorted({row["claim"] for row in other}), [int(row["seed"]) for row in other]
         told = f"seeds {min(used)} to {max(used)} have judged {', '.join(names)} under other criteria"
@@ -149,13 +149,15 @@ def refuse_judged(ids, seeds, table_path, stamps):
 
 def stamp(claim):
     """The fingerprints of the code that makes a claim's numbers, and of what they are judged by."""
+    return {"code": fingerprint(claim.experiment.__module__), "criteria": criteria_stamp(claim)}
+
+
+def criteria_stamp(claim):
+    """The fingerprint of what a claim is judged by: its words, what is wanted, what matters, and the rule."""
     judged = asked_of(claim) | {"criteria": [each for each in asked_of(claim)["criteria"] if each["wanted"]]}
     for each in judged["criteria"]:
         del each["meaning"]
-    return {
-        "code": fingerprint(claim.experiment.__module__),
-        "criteria": fingerprint_of_text(repr(judged), fingerprint(RULE)),
-    }
+    return fingerprint_of_text(repr(judged), fingerprint(RULE))
 
 
 RULE = "dollop.replication.judging"
@@ -219,7 +221,7 @@ def read_table(path):
     FormatError
         If the file is something else.
     """
-    ledger, criteria = ledger_at(path), {id: stamp(claim)["criteria"] for id, claim in CLAIMS.items()}
+    ledger, criteria = ledger_at(path), {id: criteria_stamp(claim) for id, claim in CLAIMS.items()}
     rows, damaged = ledger.read()
     if damaged:
         warn_of(path, f"{damaged} lines are damaged and left out")
@@ -294,8 +296,8 @@ def freeze(options):
         As `command` takes them.
     """
     folder, seeds = options.folder or Path("study"), seeds_of(options)
-    stamps = {id: stamp(claim) for id, claim in CLAIMS.items()}
-    refuse_judged(list(CLAIMS), seeds, folder / "results.csv", stamps)
+    criteria = {id: criteria_stamp(claim) for id, claim in CLAIMS.items()}
+    refuse_judged(list(CLAIMS), seeds, folder / "results.csv", criteria)
     folder.mkdir(parents=True, exist_ok=True)
     with whole_file(folder / FROZEN, "w", CRITERIA) as stream:
         stream.write(as_json(frozen(seeds)))
@@ -305,7 +307,7 @@ def freeze(options):
 def frozen(seeds):
     """What every claim is judged by, and on which seeds, as plain values for JSON."""
     rule = {"fingerprint": fingerprint(RULE), "level": LEVEL, "family": FAMILY}
-    claims = {id: {"fingerprint": stamp(claim)["criteria"]} | asked_of(claim) for id, claim in CLAIMS.items()}
+    claims = {id: {"fingerprint": criteria_stamp(claim)} | asked_of(claim) for id, claim in CLAIMS.items()}
     return {"rule": rule, "seeds": [seeds[0], seeds[-1]], "claims": claims}
 
 
@@ -314,7 +316,7 @@ def check_frozen(ids, seeds, path):
     if not path.exists():
         raise ValueError(f"no criteria are frozen in {path}: dollop study criteria writes them")
     known = json.loads(path.read_text())
-    other = [id for id in ids if known["claims"].get(id, {}).get("fingerprint") != stamp(CLAIMS[id])["criteria"]]
+    other = [id for id in ids if known["claims"].get(id, {}).get("fingerprint") != criteria_stamp(CLAIMS[id])]
     if other:
         told = f"the criteria of {', '.join(other)} are not those frozen in {path}"
         raise ValueError(f"{told}; freeze them for seeds never used: dollop study criteria --first-seed N")

@@ -24,8 +24,6 @@ NUMBERS = [(claim, criterion) for claim in CLAIMS.values() for criterion in clai
 NAMES = [f"{claim.id}-{criterion.number}" for claim, criterion in NUMBERS]
 JUDGED = [(claim, criterion) for claim, criterion in NUMBERS if criterion.wanted]
 SEED = GOLDEN["parameters"]["seed"]
-OTHER = 0
-"""A seed that the study does not use."""
 OBSERVERS = recordings, observing, environment, premises
 CHANCE = 1e-4
 """The probability that a number is refused though nothing has changed: of the two hundred and more
@@ -78,17 +76,15 @@ def asked():
 
 @pytest.fixture(scope="module")
 def fresh(asked):
-    """Rows of every claim for the golden seed, and for another of no study, each made now."""
-    rows = {SEED: [], OTHER: []}
-    for seed, made in rows.items():
-        for of_paper, methods in asked.items():
-            forget()
-            with pytest.MonkeyPatch.context() as patch:
-                for module in OBSERVERS:
-                    patch.setattr(module, "observe", partial(observed, methods))
-                made += made_now(seed, [claim.id for claim in CLAIMS.values() if (claim.section == "II") == of_paper])
-        made.sort(key=lambda row: [*CLAIMS].index(row[0]))
-    return rows
+    """Rows of every claim for the golden seed, made now."""
+    made = []
+    for of_paper, methods in asked.items():
+        forget()
+        with pytest.MonkeyPatch.context() as patch:
+            for module in OBSERVERS:
+                patch.setattr(module, "observe", partial(observed, methods))
+            made += made_now(SEED, [claim.id for claim in CLAIMS.values() if (claim.section == "II") == of_paper])
+    return sorted(made, key=lambda row: [*CLAIMS].index(row[0]))
 
 
 def observed(methods, *arguments, **options):
@@ -99,20 +95,19 @@ def observed(methods, *arguments, **options):
 
 def test_rerunnable(fresh):
     """Every experiment runs from its seed alone and gives all the numbers that its claim names."""
-    for seed, rows in fresh.items():
-        assert [(row[0], row[2]) for row in rows] == [(c.id, each.number) for c, each in NUMBERS]
-        assert {row[1] for row in rows} == {seed}
+    assert [(row[0], row[2]) for row in fresh] == [(c.id, each.number) for c, each in NUMBERS]
+    assert {row[1] for row in fresh} == {SEED}
 
 
 def test_repeatable(fresh):
     """The same seed twice, everything made anew, gives the same numbers to the last digit."""
     assert forget() >= 8  # recordings, observations, laps, task, slaloms, runs, looks, background
-    assert as_numbers(made_now(SEED)) == as_numbers(fresh[SEED])
+    assert as_numbers(made_now(SEED)) == as_numbers(fresh)
 
 
 def test_reproducible(fresh):
     """Fresh numbers of one seed are the golden ones within their tolerance, on any processor."""
-    numbers = as_numbers(fresh[SEED])
+    numbers = as_numbers(fresh)
     assert len(numbers) == sum(map(len, GOLDEN["numbers"].values()))
     for (id, number), value in numbers.items():
         golden = GOLDEN["numbers"][id][number]
@@ -142,7 +137,7 @@ def test_a_claim_without_words_or_smallest_effect_is_refused(bad):
 
 def test_no_criterion_has_been_changed_since_they_were_frozen():
     """Code, frozen file and every line of the table agree on what each claim is judged by."""
-    stamps = {id: study.stamp(claim)["criteria"] for id, claim in CLAIMS.items()}
+    stamps = {id: study.criteria_stamp(claim) for id, claim in CLAIMS.items()}
     assert {id: each["fingerprint"] for id, each in FROZEN["claims"].items()} == stamps
     rows, _ = study.ledger_at(ROOT / "study" / "results.csv").read()
     assert {(row["claim"], row["criteria"]) for row in rows} == set(stamps.items())
@@ -166,14 +161,14 @@ def test_two_hundred_seeds_are_behind_every_claim(claim, criterion):
 
 @pytest.mark.parametrize(("claim", "criterion"), NUMBERS, ids=NAMES)
 def test_fresh_numbers_are_as_recorded(claim, criterion, fresh):
-    """The number of a seed of no study is as near to the recorded mean as its spread has it.
+    """The number of a seed is as near to the recorded mean as its spread has it.
 
     It is farther off with the probability `CHANCE`: by Student's t for the difference of two means;
     for a share of trials, by the binomial at both ends of the recorded interval. How long something
     takes depends on the machine: there it is only asked that it takes time.
     """
     key, then = (claim.id, criterion.number), recorded(claim, criterion)
-    made = [value for id, _, number, value in fresh[OTHER] if (id, number) == key]
+    made = [value for id, _, number, value in fresh if (id, number) == key]
     values = np.array(made)[np.isfinite(made)]
     if criterion.timed:
         assert values.min() > 0
@@ -256,4 +251,4 @@ def test_every_verdict_is_told():
 
 def test_what_the_paper_says_of_observing_is_measured_on_its_own_method(fresh, asked):
     """Claims of Sec. II observe with method="paper" alone, those of all other sections never do."""
-    assert len(fresh) == 2 and asked == {True: {"paper"}, False: {"people"}}
+    assert fresh and asked == {True: {"paper"}, False: {"people"}}
