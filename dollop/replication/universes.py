@@ -41,7 +41,7 @@ __all__ = [
     "verdict_of", "work",
 ]  # fmt: skip
 
-COUNT, FIRST_SEED, SEEDS = 120, 1000, 10
+COUNT, FIRST_SEED, SEEDS = 100, 1000, 10
 QUICK_COUNT, QUICK_SEEDS = 31, 2
 SEED = 2004
 """Of the combinations, and of the draws that tell what chance does."""

@@ -328,9 +328,8 @@ def test_what_is_counted_is_what_the_slaloms_are_drawn_by():
 
 def test_one_can_is_moved_as_where_laws_are_compared(monkeypatch):
     """The layouts with a can elsewhere are those of `single`."""
-    monkeypatch.setattr(recordings, "figure_eights", lambda *_: SimpleNamespace(demonstration=None))
-    monkeypatch.setattr(environment, "elsewhere", lambda shown, drawn, *_: drawn[0])
-    scene = environment.can_moved.__wrapped__(4)
+    monkeypatch.setattr(environment, "seen_there", lambda drawn, *_: drawn[0])
+    scene = environment.can_moved_seen.__wrapped__(4, TOLD)
     layouts = [tried for k in range(10) if (tried := can_elsewhere([4, 17, k])) is not None]
     assert any(np.array_equal(scene.positions, each) for each in layouts)
 

@@ -171,21 +171,23 @@ def layouts(seed, how=TOLD):
     *shown, kept = [each.demonstration for each in slaloms]
     if not laws_of(shown, attrgetter("law")):
         return unknown("layouts")
-    numbers, ours = {}, replace(how, learning="anchored")
-    for name, chosen, counts in (
-        ("", how, range(1, LAYOUTS + 1)),
-        ("_ours", ours, (1, 2, LAYOUTS)),
-    ):
+    numbers, judged, ours = {}, ("", how, range(1, LAYOUTS + 1)), replace(how, learning="anchored")
+    told = [("_ours", ours, (1, 2, LAYOUTS))] * (how == TOLD)  # beside the judged ones, not in every universe
+    for name, chosen, counts in (*told, judged):
         tasks = tasks_by_number(shown, chosen, counts)
         errors = {n: error_in(kept, each, chosen) for n, each in tasks.items()}
         numbers |= {f"error_{n}{name}_m": error for n, error in errors.items()}
         numbers[f"exponent{name}"] = exponent(errors)
     error, together = numbers[f"error_{LAYOUTS}_m"], tasks[LAYOUTS]
-    return numbers | {
-        "one_more_than_six_m": numbers["error_1_m"] - error,
-        "refused": float(np.isnan(error)),
-        "set_aside": set_aside(together[0]) if together else 1.0,
-    }
+    return (
+        unknown("layouts")
+        | numbers
+        | {
+            "one_more_than_six_m": numbers["error_1_m"] - error,
+            "refused": float(np.isnan(error)),
+            "set_aside": set_aside(together[0]) if together else 1.0,
+        }
+    )
 
 
 def tasks_by_number(shown, how, counts):
