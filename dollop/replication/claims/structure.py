@@ -7,13 +7,14 @@ Beside merging stand hidden Markov models of hmmlearn, set up as their advocate 
 from functools import partial
 from importlib.util import find_spec
 from math import nan
+from operator import attrgetter
 
 import numpy as np
 
 from dollop.lab.drawn import draw_demonstrations
 from dollop.replication.baseline import METHODS, judge, task_of
 from dollop.replication.claims.claim import MOSTLY, Criterion, claim
-from dollop.replication.claims.walked import walks_again
+from dollop.replication.claims.walked import laws_of, walks_again
 from dollop.replication.reconstruction import TOLD
 
 __all__ = ["typical"]
@@ -56,12 +57,14 @@ def structure(seed, how=TOLD):
     task in 30 % of them; two of the five told beside it. Right is as many, each nearer to its own
     true subgoal than to another; one in twenty matters. Walked: three slaloms in one layout, seen by
     the laser and segmented each. They have no true subgoals: told is how often as many are found as
-    the median walk has, and how far those found lie from the nearest of each walk's own. The hidden
+    the median walk has, and how far those found lie from the nearest of each walk's own; nothing where
+    a walk cannot be cut within the tolerance. The hidden
     Markov models get the same demonstrations, and are told the same spread.
     """
     truth = task_of(int(np.random.default_rng([seed, 15]).choice(SUBGOALS)), seed)
     drawn = draw_demonstrations(truth, 5, TOLD.spread, seed=[seed, 22])
-    walked = [each.demonstration.law.subgoals for each in walks_again(seed)[:WALKS]]
+    walks = [each.demonstration for each in walks_again(seed)[:WALKS]]
+    walked = [law.subgoals for law in laws_of(walks, attrgetter("law"))]
     return {
         number: value
         for method in NAMES
@@ -76,8 +79,8 @@ def numbers_of(method, truth, drawn, walked, spread):
         ends = ("right", "right_2", "error_m", "typical", "off_m")
         return {f"{name}_{end}": nan for end in ends}
     find = partial(METHODS[method], spread=spread)
-    five, two, again = map(find, (drawn, drawn[:2], walked))
-    is_typical, off = typical(again, walked)
+    five, two = find(drawn), find(drawn[:2])
+    is_typical, off = typical(find(walked), walked) if walked else (nan, nan)
     return {
         f"{name}_right": float(judge(five, truth)["right_order"]),
         f"{name}_right_2": float(judge(two, truth)["right_order"]),
