@@ -2,6 +2,7 @@
 
 import json
 import re
+from itertools import accumulate
 
 import pytest
 from places import ROOT
@@ -9,6 +10,7 @@ from places import ROOT
 from dollop.replication import report, study, universes
 from dollop.replication.claims import CLAIMS
 
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("[0-9]*.ipynb"))
 PAGES = "README.md", "REPLICATION.md", "CONTRIBUTING.md"
 README_SETTINGS = """\
 ICRA 2004
@@ -133,10 +135,20 @@ def unexplained(text, settings):
 def unexplained_in(block, settings):
     """The same of one block."""
     explained = [each.span() for phrase in settings for each in re.finditer(re.escape(phrase), block)]
-    sentences = list(re.finditer(r"\S.*?(?:[.:;!?|](?=\s)|$)", block))
     for found in NUMERAL.finditer(block):
         if not any(begin <= found.start() and found.end() <= end for begin, end in explained):
-            yield found[0], next(each[0] for each in sentences if each.end() > found.start())
+            yield found[0], sentence_at(block, found.start())
+
+
+def sentence_at(block, place):
+    """The sentence that begins last before a place."""
+    ends = accumulate(map(len, sentences_of(block)))
+    return next(each.strip() for each, end in zip(sentences_of(block), ends, strict=True) if end > place)
+
+
+def sentences_of(block):
+    """A block's sentences, half sentences and cells, each with the white space after it."""
+    return re.findall(r".+?(?:[.:;!?|](?:\s|$)|$)", block)
 
 
 def told(text, settings):
@@ -222,6 +234,16 @@ def test_every_setting_is_in_use(name):
     """What a page no longer says is no longer named, so that it excuses nothing else."""
     blocks = prose(READ[name](page(name)))
     assert [phrase for phrase in SETTINGS[name] if not any(phrase in block for block in blocks)] == []
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebooks_send_their_readers_to_the_study_and_quote_none_of_it(path):
+    """A notebook's numbers are those of its own recordings; the study's would be stale with the next study."""
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    text = "\n\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    sentences = [each for block in prose(text.replace("REPLICATION.md", "STUDY")) for each in sentences_of(block)]
+    quoting = [each for each in sentences if "STUDY" in each and re.search("[0-9]|hundred", each)]
+    assert quoting == []
 
 
 def test_counts_of_the_study_are_as_told():
