@@ -54,6 +54,7 @@ the paper's 20 mm
 judged 31 claims on seeds 0 to 99
 the 95 % interval of an anecdote
 from 2 mm on
+against 0.95
 20 cm and 100 cm²
 the 0.30 m spare
 30 frames a second
