@@ -208,7 +208,8 @@ Every claim of the paper that [REPLICATION.md](REPLICATION.md) judges: its words
 number: the mean over the seeds, and in brackets an interval. All intervals that are judged hold their true means
 together with {LEVEL:.0%}. A number is **met** if the whole interval lies in what is wanted, **not met** if it lies
 wholly beside it, else **open**; ~ says that the answer would be another were an end of the range moved by the smallest
-difference that matters, which stands beside it. What is not wanted is told. This page is written by `dollop study`.
+difference that matters, which stands beside it. Numbers for which nothing is wanted are told. Where fewer seeds gave a
+number than were asked, how many is said. This page is written by `dollop study`.
 
 ![The criteria of all claims, each beside its range](study/claims.png)
 
@@ -219,17 +220,22 @@ def claim_block(claim):
     """One claim: heading, words, verdict, what was measured, table."""
     notes = ", by construction" * claim["by_construction"] + ", at the edge" * claim["at_edge"]
     head = f"## {claim['id']}\n\n> {claim['quote']}\n\nSec. {claim['section']}. It **{claim['verdict']}**{notes}."
-    table = ["| number | mean [interval] | wanted |", "|---|---|---|", *map(number_row, claim["numbers"])]
+    table = [
+        "| number | mean [interval] | wanted |",
+        "|---|---|---|",
+        *(number_row(each, claim["seeds"]) for each in claim["numbers"]),
+    ]
     return "\n".join([f"{head} {claim['experiment']}\n", *table, ""])
 
 
-def number_row(number):
-    """One number's row."""
+def number_row(number, seeds):
+    """One number's row; of how many seeds it is, if some gave none."""
     wanted = wish(number["wanted"])
     if number["wanted"]:
         answer = {"yes": "**met**", "no": "**not met**", "open": "**open**"}[number["met"]] + " ~" * number["at_edge"]
         wanted = f"{wanted} (± {number['matters']:g}): {answer}"
-    return f"| {number['meaning']} | {amount(number)} | {wanted} |"
+    among = f" ({number['seeds']} seeds)" * (number["seeds"] < seeds)
+    return f"| {number['meaning']} | {amount(number)}{among} | {wanted} |"
 
 
 def amount(number):

@@ -157,10 +157,10 @@ def test_the_summary_names_what_flips_a_verdict(tmp_path):
 def test_chance_alone_is_told():
     """Of numbers that are all alike no draw differs; of such about the edge about half do."""
     rng, claim = np.random.default_rng(0), FAKES["share"]
-    assert universes.by_chance(claim, [{"high": 1.0}] * 40, 10) == 1.0
+    assert universes.by_chance(claim, [{"high": 1.0}] * 40, 10) == {"of_all_seeds": "holds", "by_chance": 1.0}
     edge = [{"high": value} for value in rng.normal(0.5, 1.0, 200)]
-    assert 0.3 < universes.by_chance(claim, edge, 10) < 0.8
-    assert universes.by_chance(claim, edge[:12], 10) is None
+    assert 0.3 < universes.by_chance(claim, edge, 10)["by_chance"] < 0.8
+    assert universes.by_chance(claim, edge[:12], 10) == {"of_all_seeds": None, "by_chance": None}
 
 
 def test_seeds_that_are_none_are_refused(tmp_path):

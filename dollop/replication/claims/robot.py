@@ -232,7 +232,8 @@ def kidnap(seed, how=TOLD):
     unhurt = [run for run in runs if run.finished and not run.collisions]
     goes_on = [winds_as_demonstrated(run, task.law, scene) for run in unhurt]
     user = user_directions(shown.laps, task.law)
-    off = [heading_off(run, min(time, 60.0), *user) for run, time in zip(runs, times, strict=True)]
+    until = [min(time, first_hit(run) - run.kidnapped[0], 60.0) for run, time in zip(runs, times, strict=True)]
+    off = [heading_off(run, lasting, *user) for run, lasting in zip(runs, until, strict=True)]
     return {
         "returned": back.mean(),
         "finished": len(unhurt) / len(runs),
