@@ -110,8 +110,8 @@ UNREAD = (  # what is no prose, in the order in which it is taken out, and what 
     (r"(?m)^(    |#+ ).*$", ""),
     (report.REFERRED.pattern, "…"),
     (report.QUOTED.pattern, "…"),
-    (r"`[^`]+`", "…"),
-    (r"<[^>]+>", ""),
+    (r"`(?:[^`\n]|\n(?!\n))+`", "…"),
+    (r"<[a-z!/][^>]*>", ""),
     (r"!?\[[^\]]*\]\((figures/fig_|notebooks/|study/\w+\.png)[^)]*\)", "…"),
     (r"\bFig\. ?[0-9]+[ab]?\b|\b([Ff]igure|[Nn]otebook|Python) [0-9.]+[ab]?\b|\bx[0-9]\b", "…"),
     (r"\]\([^)]*\)", "]"),
@@ -190,6 +190,7 @@ def test_a_setting_explains_a_numeral_only_in_its_own_words():
     """The same digits elsewhere are told, and so is a longer number with the same beginning."""
     assert not unexplained("Twice 20 mm.", ("20 mm",))
     assert [n for n, _ in unexplained("20 cm, 20.5 mm and 120 mm", ("20 mm",))] == ["20", "20.5", "120"]
+    assert [n for n, _ in unexplained("A lone ` mark.\n\nIf x < 3 and y > 4` here.", ())] == ["3", "4"]
     assert told("No number.", ()) is None
 
 
