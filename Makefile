@@ -1,6 +1,6 @@
 # make figures   set up .venv from the lock, then regenerate every figure
 # make test      the same set-up, then unit tests, doctests and the notebooks
-.PHONY: help figures test fast coverage fuzz check study worlds bench book data clean
+.PHONY: help figures test fast coverage fuzz check study universes people worlds bench book data clean
 .DEFAULT_GOAL := help
 
 # The lock is for Python 3.11: the first of these that really is one.
@@ -46,8 +46,15 @@ check: .venv/ready  ## lint and formatting
 	$(RUN) -m ruff format --check .
 	$(RUN) -m nbstripout --verify notebooks/*.ipynb
 
-study: .venv/ready  ## test the paper's claims over a hundred seeds; goes on where it was
+# What the claims are judged by is frozen in study/criteria.json: `dollop study criteria --first-seed N` writes it anew.
+study: .venv/ready  ## judge the paper's claims over two hundred seeds; goes on where it was
 	$(RUN) -m dollop study
+
+universes: .venv/ready  ## the claims where what the paper leaves open is chosen otherwise, a hundred times; goes on
+	$(RUN) -m dollop study universes
+
+people: .venv/ready  ## the claims that real people's walks can be asked; DOLLOP_EXTERNAL_DATA names the folder
+	$(RUN) -m dollop study people
 
 worlds: .venv/ready  ## the whole chain in 300 random worlds; goes on where it was
 	$(RUN) -m dollop study worlds

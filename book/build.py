@@ -30,11 +30,11 @@ import dollop
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE, OUT = ROOT / "build" / "book-source", ROOT / "build" / "book"
 PAGES = (
-    *("README.md", "REPLICATION.md", "CHANGELOG.md", "CONTRIBUTING.md"),
+    *("README.md", "REPLICATION.md", "CLAIMS.md", "CHANGELOG.md", "CONTRIBUTING.md"),
     *("figures/README.md", "data/README.md", "book/own_log.md"),
 )
 PUBLIC = [name for name in dollop.__all__ if name != "__version__"]
-FILE_LINK = re.compile(r'(?:\]\(|src="|href=")([\w./-]+)(?=[)"#])')
+FILE_LINK = re.compile(r'(?:\]\(|src="|href=")([\w./-]+)(?=[)"# ])')
 CODE_LINK = re.compile(r"\]\((?P<up>(\.\./)*)(?P<path>dollop/[\w/]+)\.py\)")
 NAME = re.compile(r"`dollop\.(?P<name>(?P<first>\w+)[\w.]*)`")
 WIDGET = "application/vnd.jupyter.widget-view+json"
