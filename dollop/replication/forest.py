@@ -69,7 +69,7 @@ def forest(found):
         ax.set_ylim(len(rows) - 0.4, -0.6)
         ax.set_yticks(range(len(rows)), [words(*row) for row in rows], fontsize=6)
         ax.set_xlabel(
-            "from the nearer end of what is wanted, in smallest differences that matter\n← outside     inside →"
+            "← outside     inside →\nfrom the nearer end of what is wanted,\nin smallest differences that matter"
         )
         for answer, colour in COLOURS.items():
             ax.plot([], [], MARKERS[answer], color=colour, markersize=4, label=WORDS[answer])

@@ -396,7 +396,8 @@ def publish(table, folder):
         for path, kind, text in texts:
             with whole_file(path, "w", kind) as stream:
                 stream.write(text)
-    print(f"wrote {', '.join(str(path) for path, _, _ in texts)}")
+    written = [*[folder / "claims.png"] * bool(report), *(path for path, _, _ in texts)]
+    print(f"wrote {folder / 'results.csv'}, {', '.join(map(str, written))}")
 
 
 def first_verdicts(folder):

@@ -100,9 +100,11 @@ def test_rerunnable(fresh):
 
 
 def test_repeatable(fresh):
-    """The same seed twice, everything made anew, gives the same numbers to the last digit."""
+    """The same seed twice, everything made anew, gives the same numbers to the last digit: a claim of each file."""
     assert forget() >= 8  # recordings, observations, laps, task, slaloms, runs, looks, background
-    assert as_numbers(made_now(SEED)) == as_numbers(fresh)
+    again = as_numbers(made_now(SEED, ("alike", "filter", "salient", "kept", "kidnap", "moved", "shared", "structure")))
+    before = as_numbers(fresh)
+    assert len(again) > 40 and again == {key: before[key] for key in again}
 
 
 def test_reproducible(fresh):
