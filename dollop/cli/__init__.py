@@ -157,13 +157,13 @@ def _parser():
     add = command(
         _study,
         "study",
-        "test the paper's claims over many seeds, or the whole chain in random worlds",
+        "test the paper's claims over many seeds and choices, or the whole chain in random worlds",
     )
     add(
         "ids",
         nargs="*",
         metavar="claim",
-        help="which (default: all); an unknown one lists them; criteria: freeze them; worlds: random worlds",
+        help="which (default: all), an unknown one lists them; or criteria, universes, people or worlds",
     )
     add("--seeds", type=whole, help="how many (default: 200; 300 worlds)")
     add("--first-seed", type=whole, metavar="N", help="default: 1000; 0 for worlds")

@@ -1,10 +1,8 @@
 """What a claim of the paper is, and how one is registered beside its experiment.
 
-A claim has one criterion or more: the mean of a number over the seeds, and the range in which the
-claim wants it; some numbers have none and are only told. A criterion is met when the whole 95 %
-interval lies within its range, and clearly not met when it lies wholly beside it. A claim holds if
-all its criteria are met; it does not hold if none is and one clearly is not; otherwise it holds in
-part.
+A claim has one criterion or more: the mean of a number over the seeds, the range in which the claim
+wants it, and the smallest difference that matters; some numbers have none of these and are only
+told. What makes a verdict of them is told in `dollop.replication.judging`.
 """
 
 from collections.abc import Callable
