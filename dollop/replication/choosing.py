@@ -18,6 +18,7 @@ from dollop.lds import DECAY, LDS, STEPS, Statistics, powers_on
 from dollop.learning.anchored import tied_to_corners
 from dollop.learning.matchings import inverse, matchings_into, notes_of
 from dollop.learning.paper import anchors, members_along, shared_law
+from dollop.matching import match
 from dollop.replication.reconstruction import TOLD, Reconstruction
 from dollop.robot.guidance import PIONEER_FOLLOWING
 from dollop.segmentation import (
@@ -35,7 +36,7 @@ from dollop.trajectory import align, arc_length, distance_to_polyline, resample
 
 __all__ = [
     "LAWS", "SEEN", "SHOWN_LAW", "TIES", "ShownAs", "adapted", "as_paper", "following_of", "gait_of",
-    "law_of", "learned", "model_of", "motion_of", "response_of", "seen_by", "shown_as", "task_of",
+    "laser_of", "law_of", "learned", "model_of", "motion_of", "response_of", "seen_by", "shown_as", "task_of",
 ]  # fmt: skip
 
 LAWS = ("lds", "tolerance", "cuts", "laid")
@@ -87,8 +88,21 @@ def seen_by(scene, how=TOLD):
     """
     if how.laser_noise == TOLD.laser_noise:
         return scene
-    laser = SickLMS200(noise=how.laser_noise, mixed=MIXED * how.laser_noise / TOLD.laser_noise)
-    return replace(scene, robot=replace(scene.robot, scanner=laser))
+    return replace(scene, robot=replace(scene.robot, scanner=laser_of(how)))
+
+
+def laser_of(how=TOLD):
+    """The laser that is chosen.
+
+    Parameters
+    ----------
+    how : Reconstruction, optional
+
+    Returns
+    -------
+    SickLMS200
+    """
+    return SickLMS200(noise=how.laser_noise, mixed=MIXED * how.laser_noise / TOLD.laser_noise)
 
 
 def gait_of(how=TOLD):
@@ -354,11 +368,12 @@ def learned(demonstrations, how=TOLD):
     ValueError
         As `dollop.learn`.
     """
+    given = matchings_given(demonstrations, how)
     if how.learning == "anchored":
-        return relaid(learn(demonstrations), how)
+        return relaid(learn(demonstrations, matchings=given), how)
     if how.only((*TIES, "merging")) == TOLD:
-        return learn(demonstrations, method="paper", spread=how.spread)
-    return learned_as_paper(tuple(demonstrations), how)
+        return learn(demonstrations, matchings=given, method="paper", spread=how.spread)
+    return learned_as_paper(tuple(demonstrations), how, given)
 
 
 def adapted(task, environment, how=TOLD):
@@ -380,7 +395,18 @@ def adapted(task, environment, how=TOLD):
     ValueError
         As `Task.adapt`.
     """
-    return relaid(task.adapt(environment), how)
+    return relaid(task.adapt(environment, matching_given(task.environment, environment, how)), how)
+
+
+def matching_given(before, after, how):
+    """The matching by the paper's cost if it is chosen; None leaves it to Dollop."""
+    return match(before, after, method="literal") if how.matching == "literal" else None
+
+
+def matchings_given(demonstrations, how):
+    """The same of each demonstration's environment with that of the first, as `dollop.learn` takes them."""
+    first = demonstrations[0].environment
+    return [matching_given(shown.environment, first, how) for shown in demonstrations]
 
 
 def relaid(task, how):
@@ -409,10 +435,10 @@ def reweighed(association, how):
     return replace(association, weights=weights / weights.sum(axis=1, keepdims=True))
 
 
-def learned_as_paper(demonstrations, how):
+def learned_as_paper(demonstrations, how, given):
     """`dollop.learn` by the paper's method, with other weights, corners or merging."""
     environment = demonstrations[0].environment
-    matchings, aside = matchings_into(environment, demonstrations)
+    matchings, aside = matchings_into(environment, demonstrations, given)
     partners = tuple(None if each is None else each.partners for each in matchings)
     pairs = zip(demonstrations, matchings, strict=True)
     used = [(shown, each) for shown, each in pairs if each is not None]

@@ -29,6 +29,9 @@ class Reconstruction:
         Power of the inverse distance that weighs a corner.
     corners : int
         m, the number of nearest corners that a subgoal is tied to; all where there are no more.
+    matching : {"robust", "literal"}
+        How moved objects are matched: by Dollop's cost, what is not sure being left out; or by the
+        paper's, corner by corner.
     merging : {"evidence", "spread"}
         By what subgoals are merged: Bayesian evidence, or nearness as the spread has it.
     spread : float
@@ -53,6 +56,7 @@ class Reconstruction:
     laid: str = "warped"
     weights: float = 2.0
     corners: int = 16
+    matching: str = "robust"
     merging: str = "evidence"
     spread: float = 0.15
     learning: str = "paper"
@@ -104,6 +108,7 @@ LEVELS = {
     "laid": ("warped", "even"),
     "weights": (2.0, 1.0, 4.0),
     "corners": (16, 4),
+    "matching": ("robust", "literal"),
     "merging": ("evidence", "spread"),
     "spread": (0.15, 0.10, 0.25),
     "learning": ("paper", "anchored"),

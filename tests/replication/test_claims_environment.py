@@ -8,6 +8,7 @@ import pytest
 
 from dollop.environment import Environment
 from dollop.lab.outlines import outline_distances
+from dollop.lab.scanner import SickLMS200
 from dollop.replication import peers
 from dollop.replication.claims import environment, foreground
 from dollop.replication.draws import drawn_until_room
@@ -192,7 +193,7 @@ def test_readings_on_a_body_are_on_it():
     """Within the laser's noise, apart from the few mixed ones at its edges."""
     rng = np.random.default_rng(1)
     for outline in (foreground.WAIST, foreground.CAN, foreground.SLIM):
-        blob = foreground.blob_of(outline, (2.0, 0.3), rng, turn=0.5)
+        blob = foreground.blob_of(outline, (2.0, 0.3), rng, SickLMS200(), turn=0.5)
         placed = outline._replace(x=2 * np.cos(0.3), y=2 * np.sin(0.3), turn=0.5)
         off = np.abs(outline_distances(blob, [placed]))
         assert len(blob) > 6 and (off < 0.025).sum() >= len(blob) - 2

@@ -385,7 +385,7 @@ def right_ahead(before, after):
     Criterion("law_clear_ours", "share of ours that touch no can", trials=1),
     Criterion("robot_clear_ours", "share of our runs that finish and touch nothing", trials=1),
     Criterion("draws", "layouts drawn until one has room"),
-    choices=(*SHOWN, *TIES, "learning", "reach", "gain"),
+    choices=(*SHOWN, *TIES, "matching", "learning", "reach", "gain"),
 )
 def moved(seed, how=TOLD):
     """Whether the law among moved cans is still a figure-eight and, like the robot, clear of them.
@@ -444,7 +444,7 @@ def as_shown(law, scene, method, run):
     Criterion("ours_cones_m", "two cones moved: the same [m]"),
     Criterion("draws", "a can moved: layouts drawn until one has room"),
     Criterion("draws_cones", "two cones moved: the same"),
-    choices=(*SHOWN, *TIES, "learning"),
+    choices=(*SHOWN, *TIES, "matching", "learning"),
 )
 def single(seed, how=TOLD):
     """How far a DMP, the adapted law and a law trained anew are from what a user walks there.
@@ -633,7 +633,7 @@ def similarity(before, after, turning=True):
     Criterion("two_cones_m", "m = 2: the same [m]"),
     Criterion("four_cones_m", "m = 4: the same [m]"),
     Criterion("eight_cones_m", "m = 8, half of all corners: the same [m]"),
-    choices=(*SHOWN, "weights"),
+    choices=(*SHOWN, "weights", "matching"),
 )
 def nearest(seed, how=TOLD):
     """How much it matters which m, of which the paper names none: 1, 2, 4 or 8.
@@ -643,7 +643,7 @@ def nearest(seed, how=TOLD):
     centimetre apart at most, a fifth of a cell. Nothing where not all objects are matched with
     confidence.
     """
-    numbers, chosen = {}, how.only((*SHOWN, "weights"))
+    numbers, chosen = {}, how.only((*SHOWN, "weights", "matching"))
     for name, there in moved_each_way(seed, how):
         try:
             errors = [error_with(there, replace(chosen, corners=m)) for m in (1, 2, 4, 8)]

@@ -14,12 +14,11 @@ from dollop.foreground import endpoints, find_blobs, foreground_mask, surface_po
 from dollop.gridmap import flat_cells, in_metres
 from dollop.lab.outlines import Outline, meeting, outline_distances
 from dollop.lab.person import DEPTH, SHOULDERS
-from dollop.lab.scanner import SickLMS200
 from dollop.lab.scenes import figure_eight_scene, rearranged
 from dollop.lab.things import Object
 from dollop.laser import LaserLog
 from dollop.replication import recordings
-from dollop.replication.choosing import seen_by
+from dollop.replication.choosing import laser_of, seen_by
 from dollop.replication.claims.claim import REGISTRY, Criterion, claim
 from dollop.replication.draws import drawn_until_room
 from dollop.replication.reconstruction import TOLD
@@ -45,8 +44,9 @@ SLIM = WAIST._replace(half_width=CAN.radius - DEPTH / 2)
     Criterion("right_depth", "share told apart by its depth alone", trials=40),
     Criterion("right_curvature", "share told apart by its curvature alone", trials=40),
     Criterion("right_motion", "share told apart by where it is a second later", trials=40),
+    choices=("laser_noise",),
 )
-def alike(seed, count=40):
+def alike(seed, how=TOLD, count=40):
     """Whether one scan of a body tells a person's waist from a trash can.
 
     As many waists, the laboratory's 0.45 m by 0.25 m and rounded, as cans, 0.36 m across, 1 to 6 m
@@ -57,43 +57,43 @@ def alike(seed, count=40):
     hardly better, and one of twenty more or less matters. After a second: moved by more than 0.2 m
     or not, the person walking a figure-eight.
     """
-    rng = np.random.default_rng([seed, 24])
-    bodies, known = drawn_bodies(WAIST, count, rng), bodies_known(WAIST)
+    rng, laser = np.random.default_rng([seed, 24]), laser_of(how)
+    bodies, known = drawn_bodies(WAIST, count, rng, laser), bodies_known(WAIST, how)
     names, person = ("width", "depth", "curvature"), bodies[1]
     alone = {f"right_{name}": right_by_threshold(known, bodies, k) for k, name in enumerate(names)}
-    slim = right_by_likeness(bodies_known(SLIM), drawn_bodies(SLIM, count, rng))
-    moved = moved_by(seed, person, rng) > 0.2
+    slim = right_by_likeness(bodies_known(SLIM, how), drawn_bodies(SLIM, count, rng, laser))
+    moved = moved_by(seed, person, rng, laser) > 0.2
     numbers = {"right": right_by_likeness(known, bodies), "right_as_wide": slim}
     return numbers | alone | {"right_motion": np.mean(moved == person)}
 
 
 @cache
-def bodies_known(waist, count=2000):
+def bodies_known(waist, how, count=2000):
     """Bodies to learn from, the same for all seeds: shapes (N, 4), and which are persons (N,)."""
-    return drawn_bodies(waist, count, np.random.default_rng(24))
+    return drawn_bodies(waist, count, np.random.default_rng(24), laser_of(how))
 
 
-def drawn_bodies(waist, count, rng):
+def drawn_bodies(waist, count, rng, laser):
     """Shapes (N, 4) of waists and cans in turn, each in its own scan, and which are waists (N,)."""
     person = np.arange(count) % 2 == 0
     places = rng.uniform([1, -1.3], [6, 1.3], (count, 2))
     outlines = (waist if each else CAN for each in person)
     bodies = zip(outlines, places, strict=True)
-    return np.array([shape_of(blob_of(*body, rng)) for body in bodies]), person
+    return np.array([shape_of(blob_of(*body, rng, laser)) for body in bodies]), person
 
 
-def blob_of(outline, place, rng, turn=None):
+def blob_of(outline, place, rng, laser, turn=None):
     """Readings (N, 2) in m on a body at a place (distance, bearing), as seen from the laser.
 
     Those by which the body is parted from the wall behind it by more than the 20 cm of Sec. II.
     """
-    scanner, (distance, bearing) = SickLMS200(), place
+    distance, bearing = place
     x, y = distance * np.cos(bearing), distance * np.sin(bearing)
     body = outline._replace(x=x, y=y, turn=rng.uniform(-np.pi, np.pi) if turn is None else turn)
     wall = distance + rng.uniform(0.7, 3.0)
-    ranges = scanner.report(np.minimum(meeting((0, 0), scanner.angles, [body])[:, 0], wall), rng)
-    on = (ranges < wall - 0.2) & (np.abs(scanner.angles - bearing) < 0.5 / distance)
-    beams = np.column_stack([np.cos(scanner.angles), np.sin(scanner.angles)])
+    ranges = laser.report(np.minimum(meeting((0, 0), laser.angles, [body])[:, 0], wall), rng)
+    on = (ranges < wall - 0.2) & (np.abs(laser.angles - bearing) < 0.5 / distance)
+    beams = np.column_stack([np.cos(laser.angles), np.sin(laser.angles)])
     return ranges[on, None] * beams[on]
 
 
@@ -128,7 +128,7 @@ def right_by_threshold(known, bodies, k):
     return np.mean((seen[:, k] > at[best]) == (person == (above[best] > 0.5)))
 
 
-def moved_by(seed, person, rng):
+def moved_by(seed, person, rng, laser):
     """How far (N,) in m the middle of each body's readings is from where it was a second before."""
     truth = recordings.figure_eights(seed).recording.truth
     t, places = truth.t.to_numpy(), truth[["x", "y"]].to_numpy() @ (1, 1j)
@@ -137,14 +137,14 @@ def moved_by(seed, person, rng):
         begin, heading = rng.uniform(t[0], t[-1] - 1), rng.uniform(-np.pi, np.pi)
         way = np.diff(np.interp([begin, begin + 1], t, places)).item() if each else 0.0
         place = 4.0 * np.exp(1j * rng.uniform(-1.3, 1.3)) + np.array([0.0, way])
-        before, after = (middle_of(WAIST if each else CAN, z, rng, heading) for z in place)
+        before, after = (middle_of(WAIST if each else CAN, z, rng, laser, heading) for z in place)
         moves.append(np.linalg.norm(after - before))
     return np.array(moves)
 
 
-def middle_of(outline, place, rng, turn):
+def middle_of(outline, place, rng, laser, turn):
     """Middle (2,) in m of the readings on a body at a complex place; far away if there are none."""
-    blob = blob_of(outline, (abs(place), np.angle(place)), rng, turn)
+    blob = blob_of(outline, (abs(place), np.angle(place)), rng, laser, turn)
     return blob.mean(axis=0) if len(blob) else np.full(2, 1e3)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from dollop.lab.drawn import draw_demonstrations
 from dollop.replication.baseline import METHODS, judge, task_of
+from dollop.replication.choosing import model_of
 from dollop.replication.claims.claim import MOSTLY, Criterion, claim
 from dollop.replication.claims.walked import laws_of, walks_again
 from dollop.replication.reconstruction import TOLD
@@ -47,7 +48,7 @@ WALKS = 3
     Criterion("merging_off_m", "walked: subgoals found to the walks' own, mean distance [m]"),
     Criterion("hmm_off_m", "of the ergodic HMM [m]"),
     Criterion("left_to_right_off_m", "of the left-to-right HMM [m]"),
-    choices=("spread",),
+    choices=("merging", "spread"),
 )
 def structure(seed, how=TOLD):
     """Whether the number of subgoals and their order are found, nothing but the spread being told.
@@ -66,19 +67,17 @@ def structure(seed, how=TOLD):
     walks = [each.demonstration for each in walks_again(seed)[:WALKS]]
     walked = [law.subgoals for law in laws_of(walks, attrgetter("law"))]
     return {
-        number: value
-        for method in NAMES
-        for number, value in numbers_of(method, truth, drawn, walked, how.spread).items()
+        number: value for method in NAMES for number, value in numbers_of(method, truth, drawn, walked, how).items()
     }
 
 
-def numbers_of(method, truth, drawn, walked, spread):
+def numbers_of(method, truth, drawn, walked, how):
     """What a method makes of demonstrations that were drawn and walked."""
     name = NAMES[method]
     if method != "merging" and not find_spec("hmmlearn"):
         ends = ("right", "right_2", "error_m", "typical", "off_m")
         return {f"{name}_{end}": nan for end in ends}
-    find = partial(METHODS[method], spread=spread)
+    find = partial(merged_as, how=how) if method == "merging" else partial(METHODS[method], spread=how.spread)
     five, two = find(drawn), find(drawn[:2])
     is_typical, off = typical(find(walked), walked) if walked else (nan, nan)
     return {
@@ -88,6 +87,12 @@ def numbers_of(method, truth, drawn, walked, spread):
         f"{name}_typical": is_typical,
         f"{name}_off_m": off,
     }
+
+
+def merged_as(sequences, how):
+    """What merging takes for the task, (L, 2) in m."""
+    model = model_of(sequences, how)
+    return model.means[model.most_likely_path()]
 
 
 def typical(found, walked):

@@ -33,7 +33,7 @@ NEARER = (0.01, inf)
 WALKS = ("lds", "tolerance", "cuts", "laser_noise", "walker")
 """Choices on which the subgoals of one walk depend."""
 
-LEARNED = (*WALKS, "weights", "corners", "merging", "spread", "learning")
+LEARNED = (*WALKS, "weights", "corners", "matching", "merging", "spread", "learning")
 """Choices on which a task depends that is learned from slaloms in several layouts."""
 
 NEAR = recordings.KEPT["from_background"]
