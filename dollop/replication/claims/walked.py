@@ -108,7 +108,7 @@ def exponent(errors):
 
     Examples
     --------
-    >>> round(exponent({1: 0.2, 4: 0.1, 9: np.nan}), 6)
+    >>> round(float(exponent({1: 0.2, 4: 0.1, 9: np.nan})), 6)
     -0.5
     """
     found = [(n, error) for n, error in errors.items() if np.isfinite(error)]
