@@ -310,7 +310,7 @@ def test_a_table_that_is_none_is_refused(tmp_path, text, message):
         (["worlds", "--seeds", "0"], "a seed or more"),
         (["worlds", "--first-seed", "-1"], "a seed or more"),
         (["worlds", "filter"], "a study of its own"),
-        (["filter", "--first-seed", "5"], "from seed 0 on"),
+        (["filter", "--first-seed", "-1"], "at least 2 seeds, from 0 on"),
     ],
 )
 def test_a_study_that_cannot_be_is_refused(tmp_path, arguments, message):
