@@ -545,13 +545,13 @@ def test_edges_are_where_the_smallest_effect_would_change_the_answer(low, high, 
 
 
 def test_all_intervals_hold_together():
-    """Of 200 families of a hundred intervals nearly all hold all their means; of single ones hardly any would."""
+    """Of forty families of a hundred intervals nearly all hold all their means; of single ones hardly any would."""
     rng, whole, alone = np.random.default_rng(3), 0, 0
-    for _ in range(100):
+    for _ in range(40):
         families = rng.normal(0, 1, (judging.FAMILY, 200))
         whole += all(low <= 0 <= high for _, low, high in map(judging.interval, families))
         alone += all(low <= 0 <= high for _, low, high in (judging.interval(each, level=0.95) for each in families))
-    assert whole >= 90 and alone <= 5
+    assert whole >= 35 and alone <= 3
 
 
 FOUND = [{"id": "luck", "numbers": [{"number": "hit", "mean": -0.23456}]}]
