@@ -181,7 +181,7 @@ def test_as_told_is_the_library(shown):
     for mine, usual in ((task, same), [each.adapt(shown[1].environment) for each in (task, same)]):
         assert np.array_equal(mine.law.response(method="paper"), usual.law.response(method="paper"))
     by_library = learn(shown, method="paper", spread=0.15)
-    for learned in (choosing.learned(shown), choosing.learned_as_paper(tuple(shown), TOLD)):
+    for learned in (choosing.learned(shown), choosing.learned_as_paper(tuple(shown), TOLD, None)):
         assert np.allclose(learned.law.subgoals, by_library.law.subgoals, atol=1e-12)
         assert np.allclose(learned.association.weights, by_library.association.weights)
 
