@@ -1,5 +1,6 @@
 """Many universes: every choice is in enough of them, what does not matter is not run again, and it goes on."""
 
+import json
 from collections import Counter
 from dataclasses import fields, replace
 from math import inf
@@ -7,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from places import ROOT
 
 from dollop.cdhmm import SubgoalHMM
 from dollop.lab.drawn import TASKS, draw_demonstrations
@@ -161,6 +163,17 @@ def test_chance_alone_is_told():
     edge = [{"high": value} for value in rng.normal(0.5, 1.0, 200)]
     assert 0.3 < universes.by_chance(claim, edge, 10)["by_chance"] < 0.8
     assert universes.by_chance(claim, edge[:12], 10) == {"of_all_seeds": None, "by_chance": None}
+
+
+def test_what_is_published_follows_from_the_table():
+    """A hundred universes of ten seeds, all lines sound and of one code a claim; summary and report follow by rule."""
+    rows, damaged = universes.ledger_at(ROOT / "study" / "universes.csv").read()
+    found = universes.summary(rows, ALL, results=ROOT / "study" / "results.csv")
+    assert damaged == 0 and len({(row["claim"], row["code"]) for row in rows}) == len(found["claims"])
+    assert found == json.loads((ROOT / "study" / "universes.json").read_text())
+    assert found["universes"] >= 100 and found["seeds"] == [1000, 1009]
+    assert set(found["raised"]) == {"ValueError"}  # what a universe does not allow, and no mistake of ours
+    assert universes.markdown(found) in (ROOT / "REPLICATION.md").read_text()
 
 
 def test_seeds_that_are_none_are_refused(tmp_path):
