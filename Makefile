@@ -25,9 +25,10 @@ help:  ## this list
 figures: .venv/ready  ## simulate, observe, learn, perform and draw every figure into figures/
 	$(RUN) -m dollop.figures
 
+# The last notebooks are the longest: begun first, they do not keep the other core waiting.
 test: .venv/ready  ## unit tests, doctests, notebooks
 	$(RUN) -m pytest -q
-	env -u MPLBACKEND $(RUN) -m pytest --nbmake --nbmake-timeout=120 -n 2 -q -o addopts="" notebooks
+	env -u MPLBACKEND $(RUN) -m pytest --nbmake --nbmake-timeout=120 -n 2 -q -o addopts="" $$(ls -r notebooks/*.ipynb)
 
 fast: .venv/ready  ## the tests of the library alone, without the replication
 	$(RUN) -m pytest -q -m "not replication"

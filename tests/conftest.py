@@ -9,11 +9,18 @@ from walks import walk_figure_eights
 
 from dollop.laps import laps
 
-settings.register_profile("repeatable", derandomize=True, deadline=None)
-settings.register_profile("fresh", deadline=None)  # pytest --hypothesis-profile=fresh: new examples every time
+settings.register_profile("repeatable", max_examples=50, derandomize=True, deadline=None)
+settings.register_profile("fresh", deadline=None)  # pytest --hypothesis-profile=fresh: a hundred new ones every time
 settings.load_profile("repeatable")
 
-TOGETHER = "test_claims.py", "test_worlds.py", "test_readme.py", "test_package.py", "test_cli_naming.py"
+TOGETHER = (
+    "test_claims.py",
+    "test_worlds.py",
+    "test_study.py",
+    "test_readme.py",
+    "test_package.py",
+    "test_cli_naming.py",
+)
 """Files with a fixture that takes seconds: one worker runs all of each, so that no other makes it again."""
 
 

@@ -96,6 +96,7 @@ def test_the_picture_of_something_else_is_not_replaced(words, owner, occupied, m
     assert said.err.count("\n") == 1 and held(occupied) == before
 
 
+@pytest.mark.usefixtures("blank")
 @pytest.mark.parametrize("command", ["map", "learn", "perform", "observe", "show a task"])
 def test_the_same_command_works_again(command, room, capsys):
     """Over its own files, also where an exported route bears the same name."""
@@ -104,4 +105,12 @@ def test_the_same_command_works_again(command, room, capsys):
     assert call(capsys, *COMMANDS[command]).status == 0
     first = held(room)
     assert call(capsys, *COMMANDS[command]).status == 0 and held(room) == first
+
+
+@pytest.mark.usefixtures("blank")
+def test_a_task_is_adapted_in_its_place(room, capsys):
+    """Its own file is the one that may be replaced, also where an exported route bears the same name."""
+    assert call(capsys, "export", "task.json", "--to", "nav2", "--out", "task.geojson").status == 0
+    before = held(room)
     assert call(capsys, "adapt", "task.json", LOOK, "--map", "lab.yaml", "--out", "task.json").status == 0
+    assert held(room)[room / "task.json"] != before[room / "task.json"]

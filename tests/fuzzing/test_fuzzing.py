@@ -13,7 +13,7 @@ import calls
 import kinds
 from watch import watch_all, watched
 
-SEED, FILES, BAGS, CALLS = 0, 60, 20, 200
+SEED, FILES, BAGS, CALLS = 0, 40, 10, 200
 """How many files of each kind, fewer of bags, which take longer to read, and calls of each."""
 
 

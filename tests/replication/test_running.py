@@ -18,9 +18,9 @@ def marks_in(folder):
 
 @pytest.mark.parametrize(("seed", "at_once"), [(0, 1), (1, 3)])
 def test_studies_that_are_killed_lose_nothing(tmp_path, seed, at_once):
-    """Three kills of studies and workers: every row stays, at most the jobs under way are repeated, nothing is left."""
-    found = killed_study(tmp_path, 3, seed, at_once=at_once)
-    assert found["kills"] == 3 and found["jobs"] >= 90
+    """Two kills of studies and workers: every row stays, at most the jobs under way are repeated, nothing is left."""
+    found = killed_study(tmp_path, 2, seed, at_once=at_once)
+    assert found["kills"] == 2 and found["jobs"] >= 90
     assert found["lost"] == found["missing"] == 0 and found["left"] == []
     assert found["repeated"] <= found["allowed"]
 

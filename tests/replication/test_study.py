@@ -153,42 +153,44 @@ def test_what_kills_its_worker_again_and_again_is_set_aside(tmp_path, runs, caps
     assert "not done" not in path.read_text()
 
 
-def cluster_of_two(distributed):
-    """A Dask cluster of two workers on this machine."""
-    return distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
-
-
-def test_a_dask_cluster_gives_the_same_numbers(tmp_path):
-    """Naming a scheduler moves the work there and changes nothing else."""
+@pytest.fixture(scope="module")
+def cluster():
+    """A Dask cluster of two workers on this machine, which gives a job up after its second death."""
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 1))
+        yield cluster
+
+
+def test_a_dask_cluster_gives_the_same_numbers(tmp_path, cluster):
+    """Naming a scheduler moves the work there and changes nothing else."""
     tables = []
-    with cluster_of_two(distributed) as cluster:
-        for name, scheduler in (("here", None), ("there", cluster.scheduler_address)):
-            path = tmp_path / name
-            tables.append(study.run_study(["combined"], range(3), path, scheduler, jobs=1))
+    for name, scheduler in (("here", None), ("there", cluster.scheduler_address)):
+        path = tmp_path / name
+        tables.append(study.run_study(["ceiling"], range(3), path, scheduler, jobs=1))
     here, there = (table.sort_values(["seed", "number"]).reset_index(drop=True) for table in tables)
     pd.testing.assert_frame_equal(here, there)
 
 
-def test_what_dask_gives_up_is_set_aside(tmp_path, runs):
+def test_what_dask_gives_up_is_set_aside(tmp_path, runs, cluster):
     """The study does not wait for what a cluster has given up; the other seeds are kept."""
-    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
     path = tmp_path / "results.csv"
-    with cluster_of_two(distributed) as cluster, distributed.Client(cluster) as client:
-        client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 1))
-        with pytest.raises(RuntimeError, match="1 jobs were set aside: claim fake, seed 1"):
-            study.run_study(["fake"], range(4), path, cluster.scheduler_address, dying(runs, 99))
+    with pytest.raises(RuntimeError, match="1 jobs were set aside: claim fake, seed 1"):
+        study.run_study(["fake"], range(4), path, cluster.scheduler_address, dying(runs, 99))
     assert study.read_table(path).seed.tolist() == [0, 2, 3]
 
 
 def test_the_command_writes_table_and_claims(tmp_path, capsys):
     """From the command line to results.csv and claims.json; a second call adds nothing."""
-    arguments = ["study", "combined", "--seeds", "4", "--folder", str(tmp_path / "s")]
+    arguments = ["study", "ceiling", "--seeds", "4", "--folder", str(tmp_path / "s")]
     main(arguments)
     table = (tmp_path / "s" / "results.csv").read_text()
     (found,) = json.loads((tmp_path / "s" / "claims.json").read_text())
-    assert found["id"] == "combined" and found["seeds"] == 4
-    assert "combined" in capsys.readouterr().out
+    assert found["id"] == "ceiling" and found["seeds"] == 4
+    assert "ceiling" in capsys.readouterr().out
     main(arguments)
     assert (tmp_path / "s" / "results.csv").read_text() == table
 

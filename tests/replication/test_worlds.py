@@ -324,15 +324,14 @@ def test_a_study_that_cannot_be_is_refused(tmp_path, arguments, message):
 
 
 def test_the_chain_ends_alike_twice_and_on_a_cluster(tmp_path):
-    """Two worlds give the same table in this process, on two others, and on a cluster named by its scheduler."""
+    """Two worlds give the same table in this process and on a cluster named by its scheduler."""
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
     pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
     here = survey.run_survey(SHORT, tmp_path / "here.csv", jobs=0)
-    two = survey.run_survey(SHORT, tmp_path / "two.csv", jobs=2)
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
         there = survey.run_survey(SHORT, tmp_path / "there.csv", cluster.scheduler_address)
-    assert here.equals(two) and here.equals(there)
-    assert len({(tmp_path / name).read_bytes() for name in ("here.csv", "two.csv", "there.csv")}) == 1
+    assert here.equals(there)
+    assert (tmp_path / "here.csv").read_bytes() == (tmp_path / "there.csv").read_bytes()
 
 
 def test_every_world_can_be_drawn(worlds):
