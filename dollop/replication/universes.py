@@ -505,7 +505,7 @@ def command(options):
     Raises
     ------
     ValueError
-        If there is no seed, or experiments failed.
+        If there is no seed, if REPLICATION.md tells of other ones, or experiments failed.
     KeyboardInterrupt
         When interrupted, with the words where it goes on.
     """
@@ -515,15 +515,18 @@ def command(options):
         raise ValueError(f"universes need a seed or more, from 0 on, got {seeds} from {first} on")
     need("lab")
     folder = options.folder or Path("study-quick" if options.quick else "study")
+    if report_beside(folder) and (first, seeds) != (FIRST_SEED, SEEDS):
+        told = f"REPLICATION.md tells of seeds {FIRST_SEED} to {FIRST_SEED + SEEDS - 1}"
+        raise ValueError(f"{told}, got {first} to {first + seeds - 1}; with --folder others can be looked at")
     folder.mkdir(parents=True, exist_ok=True)
     path, hows = folder / "universes.csv", universes(QUICK_COUNT if options.quick else COUNT)
     check_writable(path)
     with going_on_in(path):
         rows = run_universes(hows, range(first, first + seeds), path, options.scheduler)
-    publish(summary(rows, hows, results=folder / "results.csv"), folder, whole=not options.quick)
+    publish(summary(rows, hows, results=folder / "results.csv"), folder)
 
 
-def publish(found, folder, whole):
+def publish(found, folder):
     """Write the summary and the figure, and the table in REPLICATION.md if it has one."""
     for id, told in found["claims"].items():
         same = f"{percent(told['same']):>6} the same"
@@ -534,7 +537,7 @@ def publish(found, folder, whole):
         draw_figure(found, written[2])
         with whole_file(written[1], "w", SUMMARY) as stream:
             stream.write(as_json(found))
-        if report and whole and "<!-- universes: begin -->" in report.read_text():
+        if report and "<!-- universes: begin -->" in report.read_text():
             text = put_between_marks(report.read_text(), "universes", markdown(found))
             with whole_file(report, "w", REPORT) as stream:
                 stream.write(text)

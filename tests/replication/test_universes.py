@@ -184,6 +184,16 @@ def test_seeds_that_are_none_are_refused(tmp_path):
     assert not options.folder.exists()
 
 
+@pytest.mark.parametrize(("seeds", "first", "quick"), [(3, None, False), (None, 7, False), (None, None, True)])
+def test_the_report_tells_of_its_own_seeds_alone(seeds, first, quick, tmp_path):
+    """Others are refused beside it."""
+    (tmp_path / "REPLICATION.md").touch()
+    options = SimpleNamespace(seeds=seeds, first_seed=first, quick=quick, folder=tmp_path / "study", scheduler=None)
+    with pytest.raises(ValueError, match="tells of seeds 1000 to 1009, got .*; with --folder others"):
+        universes.command(options)
+    assert not options.folder.exists()
+
+
 # ---- what is chosen
 
 
