@@ -13,16 +13,6 @@ settings.register_profile("repeatable", max_examples=50, derandomize=True, deadl
 settings.register_profile("fresh", deadline=None)  # pytest --hypothesis-profile=fresh: a hundred new ones every time
 settings.load_profile("repeatable")
 
-TOGETHER = (
-    "test_claims.py",
-    "test_worlds.py",
-    "test_study.py",
-    "test_readme.py",
-    "test_package.py",
-    "test_cli_naming.py",
-)
-"""Files with a fixture that takes seconds: one worker runs all of each, so that no other makes it again."""
-
 
 def pytest_make_parametrize_id(val, argname):
     """Name bytes after their argument: file content holds what changes, such as the time in a gzip's header."""
@@ -33,19 +23,6 @@ def pytest_make_parametrize_id(val, argname):
 def pytest_xdist_auto_num_workers(config):
     """One process for single files, as more of them take longer to start than they save; else all cores."""
     return 0 if all(Path(each.split("::")[0]).is_file() for each in config.args) else None
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config, log):
-    """Tests go to whichever worker is free, one by one; the files named above as a whole, and first."""
-    from xdist.scheduler import LoadScopeScheduling
-
-    class Scheduling(LoadScopeScheduling):
-        def _split_scope(self, nodeid):
-            file = nodeid.split("::")[0]
-            return file if file.endswith(TOGETHER) else nodeid
-
-    return Scheduling(config, log)
 
 
 def pytest_collection_modifyitems(items):
