@@ -1,6 +1,7 @@
 """Many universes: every choice is in enough of them, what does not matter is not run again, and it goes on."""
 
 import json
+import re
 from collections import Counter
 from dataclasses import fields, replace
 from math import inf
@@ -174,6 +175,23 @@ def test_what_is_published_follows_from_the_table():
     assert found["universes"] >= 100 and found["seeds"] == [1000, 1009]
     assert set(found["raised"]) == {"ValueError"}  # what a universe does not allow, and no mistake of ours
     assert universes.markdown(found) in (ROOT / "REPLICATION.md").read_text()
+
+
+def test_what_the_report_says_of_the_universes_in_words():
+    """Which claims keep their verdict in nine of ten, what turns the other ones, and why `layouts` is other."""
+    text = " ".join((ROOT / "REPLICATION.md").read_text().split())
+    told = json.loads((ROOT / "study" / "universes.json").read_text())["claims"]
+    sentence = re.search(r"stands whatever is chosen \((.*?)sixteen of the claims", text)[1]
+    assert set(re.findall(r"`(\w+)`", sentence)) == {id for id, each in told.items() if each["same"] >= 0.9}
+    assert sum(each["same"] >= 0.9 for each in told.values()) == 16
+    legs = {id for id, each in told.items() if each["choices"].get("walker", {}).get("legs", {}).get("flips")}
+    assert legs == {"loss", "interpolation", "fastest", "kept", "prediction"}
+    literal = {id for id, each in told.items() if each["choices"].get("matching", {}).get("literal", {}).get("flips")}
+    assert literal == {"moved", "generalize", "shared", "layouts"}
+    uncut = [how for how in ALL if how == TOLD or how.tolerance == 0.01 or how.cuts == "largest"]
+    rows, _ = universes.ledger_at(ROOT / "study" / "universes.csv").read()
+    verdicts = universes.summary(rows, uncut, {"layouts": CLAIMS["layouts"]})["claims"]["layouts"]["verdicts"]
+    assert verdicts["not decided"] > 0.5 * (1 - told["layouts"]["same"]) * len(ALL)
 
 
 def test_seeds_that_are_none_are_refused(tmp_path):
