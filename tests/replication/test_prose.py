@@ -255,3 +255,29 @@ def test_counts_of_the_study_are_as_told():
     assert f"{len(CLAIMS)} claims" in text
     assert (study.SEEDS, universes.COUNT) == (200, 100)
     assert "two hundred seeds each" in text and "a hundred universes" in text
+
+
+IN_WORDS = [
+    (
+        "so that half of the way is made",
+        "single",
+        "left_more_cones_m",
+        ("left_more_cones_m", "adapted_more_cones_m"),
+        0.5,
+    ),
+    ("one demonstration in five of a minute is", "greedy", "sparse_greedy_per_min", (), 0.2),
+    ("needs only half as many numbers again", "parameters", "share_of_polyline", (), 1 / 1.5),
+    (", more than a fifth, with", "layouts", "one_more_than_six_m", ("error_1_m",), 0.23),
+    ("Ours takes nearly half of it away", "layouts", "error_6_ours_m", ("error_1_ours_m",), 0.55),
+    ("touches a cone in four layouts of ten", "generalize", "plain_clear", (), 0.6),
+]
+"""Words, the claim, a number of it, those whose sum it is a share of (none: of 1), and that share within 0.03."""
+
+
+@pytest.mark.parametrize(("words", "id", "number", "whole", "told"), IN_WORDS, ids=lambda value: str(value)[:30])
+def test_shares_told_in_words_are_those_of_the_study(words, id, number, whole, told):
+    """A half, a fifth, four of ten."""
+    (claim,) = (each for each in json.loads(page("claims.json")) if each["id"] == id)
+    means = {each["number"]: each["mean"] for each in claim["numbers"]}
+    assert words in " ".join(page("REPLICATION.md").split())
+    assert means[number] / (sum(means[each] for each in whole) or 1) == pytest.approx(told, abs=0.03)
