@@ -9,6 +9,8 @@ from pathlib import Path
 
 __all__ = ["fingerprint", "fingerprint_of_text", "modules_behind"]
 
+PICTURES = {"dollop.plot", "dollop.lab.render"}
+"""Modules that only draw: no number comes out of them, so that a figure may look otherwise and a study stay."""
 DIGITS = 12
 """Of a fingerprint, hexadecimal: among a million versions two alike have a chance of one in 500."""
 
@@ -63,6 +65,7 @@ def modules_behind(*modules):
     """The modules themselves, and those of this library that they import, inside functions too.
 
     A package that makes its names out of its modules when they are asked for brings in all of them.
+    What only draws is left out unless it is asked for itself.
 
     Parameters
     ----------
@@ -88,7 +91,7 @@ def modules_behind(*modules):
         name = left.pop()
         if name not in found:
             found.add(name)
-            left += _imported(name, _source(name))
+            left += _imported(name, _source(name)) - PICTURES
     return sorted(found)
 
 

@@ -65,6 +65,19 @@ def test_a_package_that_makes_its_names_when_asked_brings_in_all_of_them():
     assert {"dollop.lab.world", "dollop.lab.scanner"} < set(modules_behind("dollop.lab"))
 
 
+def test_what_only_draws_is_behind_no_number():
+    """A claim may import what draws, as the laboratory's door does; those modules draw, and hand back no numbers."""
+    assert not fingerprint.PICTURES & {each for claim in CLAIMS.values() for each in behind(claim)}
+    assert set(modules_behind("dollop.lab", *fingerprint.PICTURES)) > fingerprint.PICTURES
+    for name in fingerprint.PICTURES:
+        assert fingerprint._source(name).is_file()
+
+
+def behind(claim):
+    """The modules behind a claim."""
+    return modules_behind(claim.experiment.__module__)
+
+
 def test_what_has_no_source_is_refused():
     """A fingerprint of nothing would be that of any code."""
     with pytest.raises(ValueError, match="nowhere has no source"):
