@@ -7,6 +7,7 @@ out as a gallery.
 
 import argparse
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from dollop.replication import gallery
 from dollop.replication.figures import environment, learning, moved, observing, performing  # noqa: F401
 from dollop.replication.figures.panel import PANELS
 
-__all__ = ["FIGURES", "main", "make"]
+__all__ = ["FIGURES", "differences", "main", "make", "show"]
 
 FIGURES = {each.id: each for each in sorted(PANELS.values(), key=lambda each: each.picture)}
 """Every panel by id, in the paper's order; the modules above register theirs when imported."""
@@ -61,8 +62,68 @@ def make(id, folder):
                 figure.savefig(stream, format="png", metadata={"Software": None})
         finally:
             plt.close(figure)
+    return as_written(metrics)
+
+
+def as_written(metrics):
+    """The numbers of a panel as metrics.json has them."""
     plain = json.loads(json.dumps(metrics, default=float))
     return {name: rounded(value) for name, value in plain.items()}
+
+
+def show(id):
+    """Draw one panel where a notebook shows it, by the code that writes it into a file.
+
+    Parameters
+    ----------
+    id : str
+        A key of `FIGURES`.
+
+    Returns
+    -------
+    dict
+        Its numbers, as in metrics.json; none where it cannot be drawn because something is not
+        installed, which is then printed.
+    """
+    try:
+        need(FIGURES[id].extra)
+    except ImportError as error:
+        print(f"Figure {id} is not drawn here: {error}")
+        return {}
+    with plot.style():
+        _, metrics = FIGURES[id].draw()
+    return as_written(metrics)
+
+
+def differences(id, numbers, folder, within=0.02):
+    """Where the numbers of a panel are not those of metrics.json.
+
+    Parameters
+    ----------
+    id : str
+        A key of `FIGURES`.
+    numbers : dict
+        As `show` returns them; where there are none, nothing differs.
+    folder : str or Path
+        Of metrics.json.
+    within : float
+        Relative difference that another processor may make.
+
+    Returns
+    -------
+    dict
+        By name, the number here and the one in the file.
+    """
+    written = numbers_in(Path(folder))[id] if numbers else {}
+    pairs = {name: (numbers.get(name), written.get(name)) for name in numbers.keys() | written.keys()}
+    return {name: pair for name, pair in pairs.items() if not same(*pair, within)}
+
+
+def same(here, there, within):
+    """Whether two values of a panel's numbers agree: numbers nearly, all else exactly."""
+    if isinstance(here, int | float) and isinstance(there, int | float):
+        return math.isclose(here, there, rel_tol=within, abs_tol=1e-9)
+    return here == there
 
 
 def main(arguments=None):

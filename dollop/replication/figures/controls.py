@@ -23,6 +23,8 @@ RESPONSES = {"plain": "paper", "own": "held"}
 def at_once(work, arguments):
     """Call a function several times, two at a time; seeds being fixed, the numbers are the same.
 
+    The processes are forked, so that what has been recorded and learned before is theirs as well.
+
     Parameters
     ----------
     work : callable
@@ -35,7 +37,7 @@ def at_once(work, arguments):
     list
         What the calls return, in order.
     """
-    return joblib.Parallel(n_jobs=2)(joblib.delayed(work)(*each) for each in arguments)
+    return joblib.Parallel(n_jobs=2, backend="multiprocessing")(joblib.delayed(work)(*each) for each in arguments)
 
 
 def by_kind(work):
