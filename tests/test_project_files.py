@@ -17,6 +17,8 @@ CODE = sorted((ROOT / "dollop").rglob("*.py"))
 DISTRIBUTIONS = {"sklearn": "scikit-learn", "PIL": "pillow", "yaml": "pyyaml"}  # where the two names differ
 PLACES = {  # where an extra may be imported
     "lab": "dollop/lab/engine.py",
+    "films": "dollop/replication/films",
+    "notebooks": ("dollop/replication/toys", "dollop/replication/teaching", "dollop/replication/films"),
     "ros": ("dollop/formats/ros_bag", "dollop/replication/people.py"),
     "baseline": "dollop/replication/baseline.py",
     "peers": "dollop/replication/peers.py",
