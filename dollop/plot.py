@@ -5,8 +5,8 @@ Tol's: colour-blind readers can tell them apart. Green law and yellow robot are 
 whose red boxes are vermilion here. Black is for what is neutral: subgoals, corners, readings,
 writing.
 
-Everything is drawn into axes that are given; a label goes into their legend once. Lines and
-markers are so many points wide under matplotlib's own `lines.linewidth`, and thinner or wider with it.
+Everything is drawn into axes that are given; a label goes into their legend once. Lines and markers
+are so many points wide under matplotlib's own `lines.linewidth`, and thinner or wider with it.
 """
 
 from io import BytesIO
@@ -36,7 +36,7 @@ _WAIT = "#8A5A00"  # dark orange: times that are written beside a wait
 BACKGROUND = "#8C8C8C"  # grey: the background map, and how things were before
 TRUTH = "#56B4E9"  # light blue: where the user or an object really was
 ROBOT = "#F0E442"  # yellow
-MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper; first contact of a run
+MOST_LIKELY = "#B0003A"  # crimson: a CDHMM's most-likely path, red in the paper; first contacts
 LATER = LinearSegmentedColormap.from_list("later", ["#9ECAE9", "#08306B"])  # blue, darker with time
 _FLOOR = "#E8E8E8"  # palest grey: free floor of a map
 _RAY = "#C3CED6"  # pale grey: the laser's rays
@@ -80,7 +80,7 @@ def style():
 
 
 def _pt(points):
-    """So many points, more or fewer where a style draws wider or thinner lines than matplotlib does."""
+    """So many points, more or fewer where a style's lines are wider or thinner than matplotlib's."""
     return points * plt.rcParams["lines.linewidth"] / _LINE
 
 
@@ -357,7 +357,8 @@ def law(ax, response, label="control law", **look):
     **look
         Options of `path`.
     """
-    response, look = checked_positions("response", response), {"linewidth": _pt(2), "colour": LAW} | look
+    response = checked_positions("response", response)
+    look = {"linewidth": _pt(2), "colour": LAW} | look
     path(ax, response, label, **look)
     walked = arc_length(response)
     head = {"mutation_scale": _pt(18), "color": look["colour"], "linewidth": 0}
@@ -369,8 +370,8 @@ def law(ax, response, label="control law", **look):
 def runs(ax, runs, first=0):
     """Where the robot went.
 
-    Kidnapped runs have a look each, where there are several, and a number; the kidnapping is a dotted leap
-    to a numbered dot.
+    Kidnapped runs have a look each, where there are several, and a number; the kidnapping is a dotted
+    leap to a numbered dot.
     A circle is the rim of the robot where a run first touched something.
 
     Parameters
@@ -408,8 +409,8 @@ def _contacts(ax, runs, colour="black", width=0.8):
         rim = {"fill": False, "edgecolor": colour, "linewidth": width, "zorder": 7}
         ax.add_patch(Circle(_first_contact(run), getattr(run, "radius", _RIM), **rim))
     if runs:
-        look = {"color": colour, "markersize": _pt(10), "fillstyle": "none", "markeredgewidth": width}
-        ax.plot([], [], "o", label="first contact, robot's rim", **look)
+        look = {"color": colour, "fillstyle": "none", "markeredgewidth": width}
+        ax.plot([], [], "o", markersize=_pt(10), label="first contact, robot's rim", **look)
 
 
 def _first_contact(run):

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.image import imsave
 
 from dollop.checks import checked_number
-from dollop.lab.engine import LIGHT, Engine
+from dollop.lab.engine import Engine
 from dollop.lab.person import body_offsets
 from dollop.lab.pioneer import put_pioneer
 from dollop.lab.rooms import LABORATORY, panel, walls
@@ -30,18 +30,20 @@ TORSO = [(0.10, 0.0), (0.165, 0.02), (0.16, 0.15), *CHEST]
 TYRE, METAL = (0.10, 0.10, 0.10), (0.66, 0.67, 0.70)
 TREAD = [(0.050, -0.020), (0.074, -0.020), (0.081, -0.014), (0.0835, -0.007)]
 RIM = [(0.050, 0.012), (0.046, 0.014), (0.040, 0.008), (0.020, 0.010), (0.017, 0.022), (0.0, 0.022)]
-"""Radius and height in m of half a tyre, and of a wheel's outer side, over the middle of the wheel."""
+"""Radius and height in m of half a tyre, and of a wheel's outer side, over the wheel's middle."""
 SHOWN_WALLS = 4.3
-"""m, to which walls are raised in a picture of a room like the laboratory: nothing is seen above them."""
+"""m, to which walls are raised in a picture of the laboratory: nothing is seen above them."""
+LAMP = np.array([-0.35, -0.45, 0.82])
+"""Where the light comes from: the same as in a single picture."""
 SOFT = 0.12
-"""How far the light reaches round its middle where pictures are averaged, as a share of its distance."""
+"""How far round its middle the light reaches where pictures are averaged, by its distance."""
 
 
 class Studio(Engine):
     """An engine whose pictures can be averaged: edges are smooth then, and shadows soft."""
 
     def photograph(self, eye, target, view_angle, width, height, passes=1):
-        """As of `Engine`, or the mean of so many pictures, each with the light and the pixels a little aside.
+        """As of `Engine`, or the mean of so many, each with light and pixels a little aside.
 
         Parameters
         ----------
@@ -61,13 +63,15 @@ class Studio(Engine):
             return super().photograph(eye, target, view_angle, width, height)
         eye, target = self._recentred(eye, target)
         view = self._call("computeViewMatrix", eye, target, (0.0, 0.0, 1.0))
-        lens = np.array(self._call("computeProjectionMatrixFOV", view_angle, width / height, 0.1, 20.0))
+        seen_by = view_angle, width / height, 0.1, 20.0
+        lens = np.array(self._call("computeProjectionMatrixFOV", *seen_by))
         total = np.zeros((height, width, 3))
         for aside, light in zip(scattered(passes), scattered(passes, 7), strict=True):
             seen = lens.copy()
             seen[8:10] += 2 * aside / (width, height)  # by a fraction of a pixel
-            towards = LIGHT + SOFT * np.array([*(2 * light), 0.0])
-            told = {"viewMatrix": view, "projectionMatrix": seen.tolist(), "lightDirection": towards.tolist()}
+            towards = LAMP + SOFT * np.array([*(2 * light), 0.0])
+            told = {"viewMatrix": view, "projectionMatrix": seen.tolist()}
+            told["lightDirection"] = towards.tolist()
             pixels = self._call("getCameraImage", width, height, **told, **LAMPS)[2]
             total += np.reshape(pixels, (height, width, 4))[..., :3]
         return np.round(total / passes).astype(np.uint8)
@@ -96,8 +100,8 @@ def scattered(count, skipped=0):
     -------
     (count, 2) float array
     """
-    turns = np.arange(1 + skipped, 1 + skipped + count)[:, None] * [0.7548776662466927, 0.5698402909980532]
-    return turns % 1.0 - 0.5
+    steps = np.array([0.7548776662466927, 0.5698402909980532])
+    return np.arange(1 + skipped, 1 + skipped + count)[:, None] * steps % 1.0 - 0.5
 
 
 def render_robot(width=1200, height=900, passes=1):
@@ -172,7 +176,8 @@ def furnish(studio, room):
     show_floor(studio, room.bounds)
     eye, target = (np.array(place[:2]) for place in viewpoint(room))
     raised = walls(replace(room, height=max(room.height, SHOWN_WALLS * scale_of(room))))
-    for corner, end, wall in zip(room.corners, np.roll(room.corners, -1, axis=0), raised, strict=True):
+    ends = np.roll(room.corners, -1, axis=0)
+    for corner, end, wall in zip(room.corners, ends, raised, strict=True):
         along = (end - corner) / np.linalg.norm(end - corner)
         inwards = np.array([-along[1], along[0]])
         if (eye - corner) @ inwards > 0:

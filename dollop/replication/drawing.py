@@ -10,8 +10,8 @@ from dollop import plot
 from dollop.plot import STYLE
 
 __all__ = [
-    "FORCE", "JOURNAL", "METHODS", "RESPONSES", "SPRING", "WIDTH", "journal", "legend_below", "lettered", "order",
-    "picture", "png", "write",
+    "FORCE", "JOURNAL", "METHODS", "RESPONSES", "SPRING", "WIDTH", "journal", "legend_below",
+    "lettered", "order", "outside", "picture", "png", "write",
 ]  # fmt: skip
 
 WIDTH = 3.4
@@ -46,7 +46,7 @@ JOURNAL = STYLE | {
     "legend.labelspacing": 0.3,
     "pdf.fonttype": 42,  # whole outlines, which journals ask for
 }
-"""Style of the figures, as matplotlib's settings: drawn as wide as they are printed, in type of 6.5 points and more."""
+"""Style of the figures, as matplotlib's settings: as wide as printed, in type of 6.2 points and more."""
 
 RESPONSES = {
     "held": "law, rounded at subgoals",

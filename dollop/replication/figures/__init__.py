@@ -1,8 +1,8 @@
 """Every numbered figure of the paper, regenerated: python -m dollop.figures [id ...].
 
 Each panel is one function that returns the drawing and its numbers, in the modules named after
-what they show. This one writes a PNG per panel for the screen and a PDF for print, keeps the numbers
-in metrics.json, and lays them out as a gallery.
+what they show. This one writes a PNG per panel for the screen and a PDF for print, keeps the
+numbers in metrics.json, and lays them out as a gallery.
 """
 
 import argparse

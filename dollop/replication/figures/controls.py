@@ -70,7 +70,7 @@ def by_kind(work):
 
 
 def draw_runs(ax, task, runs, method="held"):
-    """Draw the runs of the robot, over them the response of the law, thin and dashed, and its subgoals.
+    """Draw the robot's runs, over them the law's response, thin and dashed, and its subgoals.
 
     Parameters
     ----------
@@ -89,14 +89,17 @@ def draw_runs(ax, task, runs, method="held"):
 
 
 def draw_distances(ax, law, runs, method):
-    """How far each run is from the response, over how far along that it is, and where the subgoals are."""
+    """How far each run is from the response, over how far along it; and where the subgoals are."""
     for run in runs:
         along, away = along_response(run, law, method)
-        plot.path(ax, np.column_stack([along, 100 * away]), colour=plot.RUN, linewidth=0.6, alpha=0.8)
-    places = np.cumsum([arc_length(each)[-1] if len(each) > 1 else 0.0 for each in law.responses(method=method)])
+        look = {"colour": plot.RUN, "linewidth": 0.6, "alpha": 0.8}
+        plot.path(ax, np.column_stack([along, 100 * away]), **look)
+    parts = law.responses(method=method)
+    places = np.cumsum([arc_length(each)[-1] if len(each) > 1 else 0.0 for each in parts])
     for k, place in enumerate(places, 1):
         ax.axvline(place, color="black", linestyle=":", linewidth=0.6, zorder=0)
-        drawing.write(ax, str(k), (place, 1.0), (0, -3), xycoords=("data", "axes fraction"), weight="bold")
+        look = {"xycoords": ("data", "axes fraction"), "weight": "bold"}
+        drawing.write(ax, str(k), (place, 1.0), (0, -3), **look)
     ax.set(xlabel="distance along the way [m]", ylabel="off [cm]", xlim=(0, places[-1] + 0.2))
 
 

@@ -44,17 +44,17 @@ LINES = {  # method: name in metrics.json, marker, numbers of demonstrations
 def figure_x2():
     """Beyond the paper: learning a task from more and more demonstrations.
 
-    (a) How often a method finds the right subgoals of the slalom in the right order, (b) those of tasks of
-    8 to 15 subgoals that are drawn; (c) how far off they are on the slalom
-    where their number is right. Bars are 95 % intervals, over 50 seeds of the slalom and 56 tasks.
-    Dotted is the error to be expected of the mean of so many subgoals, which falls as one over the
-    root of their number. The hidden Markov models are set up as their advocate would, and told the
-    spread that merging is told. Left to right, stepping over one state at most, they do as well as
-    merging on the slalom; with steps that may
-    lead anywhere they miss many of the longer tasks from two demonstrations.
+    (a) How often a method finds the right subgoals of the slalom in the right order, (b) those of
+    tasks of 8 to 15 subgoals that are drawn; (c) how far off they are on the slalom where their
+    number is right. Bars are 95 % intervals, over 50 seeds of the slalom and 56 tasks. Dotted is
+    the error to be expected of the mean of so many subgoals, which falls as one over the root of
+    their number. The hidden Markov models are set up as their advocate would, and told the spread
+    that merging is told. Left to right, stepping over one state at most, they do as well as merging
+    on the slalom; with steps that may lead anywhere they miss many of the longer tasks from two
+    demonstrations.
     """
     table = found_by_all()
-    figure, mosaic = plt.subplot_mosaic("aab;ccc", figsize=(drawing.WIDTH, 4.0))
+    figure, mosaic = plt.subplot_mosaic("aaabb;ccccc", figsize=(drawing.WIDTH, 4.0))
     axes = list(mosaic.values())
     for k, (method, rows) in enumerate(table.groupby("method", sort=False)):
         slalom, shift = rows[rows.task == "slalom"], 1.06 ** (k - 1.5)
@@ -73,7 +73,7 @@ def figure_x2():
     axes[2].set_yticks((0.05, 0.1, 0.2, 0.4), ("0.05", "0.1", "0.2", "0.4"))
     for ax in axes:
         ax.minorticks_off()
-    drawing.lettered(axes, ("slalom", "8 to 15 subgoals", "slalom"))
+    drawing.lettered(axes, ("slalom", "8–15 subgoals", "slalom"))
     drawing.legend_below(figure, *axes)
     return figure, measured(table)
 
@@ -112,7 +112,12 @@ def draw_errors(ax, method, rows, shift):
 
 def draw_points(ax, method, values, reach, shift):
     """A point with its interval for each number of demonstrations, beside those of others."""
-    look = {"color": drawing.METHODS[method], "marker": LINES[method][1], "linestyle": "none", "linewidth": 0.8}
+    look = {
+        "color": drawing.METHODS[method],
+        "marker": LINES[method][1],
+        "linestyle": "none",
+        "linewidth": 0.8,
+    }
     ax.errorbar(values.index * shift, values, reach, label=method, **look)
 
 
@@ -137,9 +142,9 @@ def measured(table):
 def figure_11a():
     """The first demonstration of a task, its subgoals and control law.
 
-    A slalom past four cones: (a) as tracked by the laser, and where its subgoals are; (b) the law that was
-    made of it, apart, for it lies on the track. Its response is rounded at the subgoals; that of every LDS
-    alone would have corners there.
+    A slalom past four cones: (a) as tracked by the laser, and where its subgoals are; (b) the law
+    that was made of it, apart, for it lies on the track. Its response is rounded at the subgoals;
+    that of every LDS alone would have corners there.
     """
     return draw_demonstration(0)
 
@@ -148,7 +153,8 @@ def figure_11a():
 def figure_11b():
     """The second demonstration, in a different environment.
 
-    The same cones, elsewhere: the walk passes each on the same side as before. (a) The track, (b) the law.
+    The same cones, elsewhere: the walk passes each on the same side as before. (a) The track, (b)
+    the law.
     """
     return draw_demonstration(1)
 
@@ -174,14 +180,14 @@ def draw_demonstration(k):
 def figure_12a():
     """The CDHMM estimated from the demonstrations of Figure 11, with the most-likely path.
 
-    Both demonstrations were mapped to the first one's environment, each subgoal by the objects that its
-    place follows; then states that the evidence cannot tell apart were merged. (a) In the room, the
-    subgoals of each demonstration, and the states that they were merged to. An ellipse is two standard
-    deviations of where a state's subgoal is expected. With two demonstrations that is nearly all prior: the
-    model starts from the spread below, which all subgoals together tell, and the two of a state change it
-    little. (b) The graph: above, a row per demonstration, a state of its own for every subgoal, as it was
-    before merging; below, the states after it. Dotted lines lead from every subgoal to the state that it
-    went into.
+    Both demonstrations were mapped to the first one's environment, each subgoal by the objects that
+    its place follows; then states that the evidence cannot tell apart were merged. (a) In the room,
+    the subgoals of each demonstration, and the states that they were merged to. An ellipse is two
+    standard deviations of where a state's subgoal is expected. With two demonstrations that is
+    nearly all prior: the model starts from the spread below, which all subgoals together tell, and
+    the two of a state change it little. (b) The graph: above, a row per demonstration, a state of
+    its own for every subgoal, as it was before merging; below, the states after it. Dotted lines
+    lead from every subgoal to the state that it went into.
     """
     task = recordings.slalom_task()
     figure = draw_learned(task)
@@ -190,18 +196,28 @@ def figure_12a():
 
 MARKERS = "o^s"
 """Of the subgoals of each demonstration."""
+INSIDE = {"ha": "center", "va": "center_baseline", "zorder": 4}
+"""How a number stands in its state."""
 
 
 def draw_learned(task):
     """The CDHMM of a task in the room, and its graph before and after merging."""
     shown = len(task.model.sequences)
     figure, axes = plt.subplots(
-        2, 1, figsize=(drawing.WIDTH, 2.85 + 0.45 * shown), gridspec_kw={"height_ratios": (1.5, 0.55 + 0.4 * shown)}
+        2,
+        1,
+        figsize=(drawing.WIDTH, 2.85 + 0.45 * shown),
+        gridspec_kw={"height_ratios": (1.5, 0.55 + 0.4 * shown)},
     )
     ax = plot.workspace(recordings.background_map(), None, task.environment.boxes, axes[0])
     for k, sequence in enumerate(task.model.sequences):
         plot.path(ax, sequence, None, linewidth=0.5, linestyle=(0, (2, 2)), zorder=4)
-        look = {"color": plot.USER, "markersize": 3, "zorder": 6, "label": f"subgoals of demonstration {k + 1}"}
+        look = {
+            "color": plot.USER,
+            "markersize": 3,
+            "zorder": 6,
+            "label": f"subgoals of demonstration {k + 1}",
+        }
         ax.plot(*sequence.T, MARKERS[k], **look)
     plot.cdhmm(ax, task.model)
     ax.set(**ROW)
@@ -212,7 +228,7 @@ def draw_learned(task):
 
 
 def draw_graph(ax, model):
-    """A row of states for each demonstration, as before merging, and under them the graph that they are merged to.
+    """A row of states for each demonstration, and under them the graph that they are merged to.
 
     Parameters
     ----------
@@ -227,8 +243,16 @@ def draw_graph(ax, model):
             draw_step(ax, (u, y), (v, y), plot.USER, 0.8)
         for number, state in enumerate(visited, 1):
             ax.plot([state, state], [y, 0], ":", color=plot.BACKGROUND, linewidth=0.8, zorder=0)
-            ax.plot(state, y, MARKERS[k], color="white", markeredgecolor=plot.USER, markersize=9, zorder=3)
-            ax.text(state, y, str(number), ha="center", va="center_baseline", zorder=4, fontsize=6.2)
+            ax.plot(
+                state,
+                y,
+                MARKERS[k],
+                color="white",
+                markeredgecolor=plot.USER,
+                markersize=9,
+                zorder=3,
+            )
+            ax.text(state, y, str(number), fontsize=6.2, **INSIDE)
         ax.text(-1.4, y + 0.4, f"demonstration {k + 1}", va="center", path_effects=[plot.HALO])
     way = model.most_likely_path().tolist()
     likely = set(pairwise([-1, *way, states]))
@@ -237,12 +261,15 @@ def draw_graph(ax, model):
         draw_step(ax, (u, 0), (v, 0), colour, width, bent=v - u > 1)
     for state in range(states):
         ax.plot(state, 0, "o", color="#D9D9D9", markeredgecolor="black", markersize=10, zorder=3)
-        ax.text(state, 0, str(state), ha="center", va="center_baseline", zorder=4, fontsize=6.5)
+        ax.text(state, 0, str(state), fontsize=6.5, **INSIDE)
     ax.text(-1.4, 0.4, "merged", va="center", path_effects=[plot.HALO])
     for y in range(rows + 1):
         ax.text(-1, y, "start", ha="center", va="center", style="italic", fontsize=6.5)
         ax.text(states, y, "end", ha="center", va="center", style="italic", fontsize=6.5)
-    ax.set(xlim=(-1.5, states + 0.4), ylim=(-0.9 if len(likely) == len(steps_of(model)) else -1.5, rows + 0.6))
+    ax.set(
+        xlim=(-1.5, states + 0.4),
+        ylim=(-0.9 if len(likely) == len(steps_of(model)) else -1.5, rows + 0.6),
+    )
     ax.set_axis_off()
 
 
@@ -268,7 +295,7 @@ def draw_step(ax, tail, head, colour, width, bent=False):
 
 
 def model_numbers(model):
-    """How many states there are before and after merging, on the most-likely path, and how far they spread."""
+    """How many states there are before merging, after it and on the path, and how far they spread."""
     return {
         "states_before": sum(len(sequence) for sequence in model.sequences),
         "states_after": len(model.means),
@@ -280,17 +307,21 @@ def model_numbers(model):
 
 @panel("x4")
 def figure_x4():
-    """Beyond the paper: three demonstrations of a slalom, one with a detour, and the graph that they become.
+    """Beyond the paper: three demonstrations of a slalom, one with a detour, and their graph.
 
-    As Figure 12a, but the graph has a branch. All three were walked past the same four cones; the last
-    one went once round the third cone before it went on. (a) The detour has states of its own, which no other
-    demonstration has. (b) In the graph the way forks there: the most-likely path, which is the task, passes
-    those states by, for two of three went on at once.
+    As Figure 12a, but the graph has a branch. All three were walked past the same four cones; the
+    last one went once round the third cone before it went on. (a) The detour has states of its own,
+    which no other demonstration has. (b) In the graph the way forks there: the most-likely path,
+    which is the task, passes those states by, for two of three went on at once.
     """
     task = detoured_task()
     figure, model = draw_learned(task), task.model
     aside = len(model.means) - len(model.most_likely_path())
-    return figure, {"demonstrations": len(model.sequences), **model_numbers(model), "states_aside": aside}
+    return figure, {
+        "demonstrations": len(model.sequences),
+        **model_numbers(model),
+        "states_aside": aside,
+    }
 
 
 DETOUR_SEED = 1
@@ -299,12 +330,13 @@ DETOUR_SEED = 1
 
 @cache
 def detoured_task():
-    """What is learned from three slaloms past the same cones, in the last of which the user goes once round a cone."""
+    """What is learned from three slaloms past the same cones, in the last once round one of them."""
     scene = lab.slalom_scene()
     rng = np.random.default_rng([DETOUR_SEED, 4])
     walks = [lab.slalom(scene, rng, **recordings.KEPT) for _ in range(2)]
     points = detoured_points(scene)
-    walks.append(lab.walk(points + rng.normal(0.0, 0.02, points.shape), scene, rng, **recordings.KEPT))
+    points += rng.normal(0.0, 0.02, points.shape)
+    walks.append(lab.walk(points, scene, rng, **recordings.KEPT))
     logs = [lab.record(scene, [DETOUR_SEED, 4, k], [walk]).log for k, walk in enumerate(walks)]
     seen = [observe(log, recordings.background_map()) for log in logs]
     return learn([Demonstration.of(each) for each in seen])
@@ -315,7 +347,17 @@ def detoured_points(scene, swing=0.75):
     first, second, third, last = scene.positions
     up, along = np.array([0.0, swing]), np.array([swing, 0.0])
     passing = [first - (1.0, 0.0), first + up, second - up, third + up]
-    return np.array([*passing, third + along, third - up, third - along, third + up, last - up, last + (1.0, 0.0)])
+    return np.array(
+        [
+            *passing,
+            third + along,
+            third - up,
+            third - along,
+            third + up,
+            last - up,
+            last + (1.0, 0.0),
+        ]
+    )
 
 
 @panel("12b", **COLUMNS)
@@ -323,12 +365,13 @@ def figure_12b():
     """The result after mapping the subgoals to a new environment.
 
     Nobody ever walked among these cones; the fan is the starts of ten runs, the same above and
-    below. The law that they follow is dashed, over the runs; above, of every LDS alone, it has corners at its
-    subgoals. Both times it is what two demonstrations together tell of which cone each of its
-    places follows. Above the paper's kind of control: the plain law, which knows of no obstacle and
-    comes as near to the cones as the law does. Below Dollop's own, which goes round what is near:
-    between two cones it keeps to the middle and leaves the law. The largest corner is where the
-    user turned as sharply. A circle, if there is one, is the robot where it first touches something.
+    below. The law that they follow is dashed, over the runs; above, of every LDS alone, it has
+    corners at its subgoals. Both times it is what two demonstrations together tell of which cone
+    each of its places follows. Above the paper's kind of control: the plain law, which knows of no
+    obstacle and comes as near to the cones as the law does. Below Dollop's own, which goes round
+    what is near: between two cones it keeps to the middle and leaves the law. The largest corner is
+    where the user turned as sharply. A circle, if there is one, is the robot where it first touches
+    something.
     """
     task, runs_of = recordings.new_slalom_task(), by_kind(recordings.slalom_runs)
     figure, axes = plt.subplots(2, 1, figsize=(drawing.WIDTH, 3.45), sharex=True)

@@ -57,20 +57,30 @@ STAGE = 1.0, 0.52  # inches: width and height of a stage in the drawing
 LEFT, MIDDLE, RIGHT = 0.58, 1.7, 2.82  # of its three columns
 WAY = {  # stage: its place in the drawing, the paper's word for it, what does it, what that returns
     "log": ((LEFT, 3.85), "laser log", dollop.read_log, dollop.LaserLog),
-    "background": ((RIGHT, 3.85), "background map", dollop.OccupancyGrid.load, dollop.OccupancyGrid),
+    "background": (
+        (RIGHT, 3.85),
+        "background map",
+        dollop.OccupancyGrid.load,
+        dollop.OccupancyGrid,
+    ),
     "observe": ((MIDDLE, 3.1), "observing\nthe user", dollop.observe, dollop.Observation),
     "subgoals": ((LEFT, 2.35), "computing\nsubgoals", dollop.SequencedLDS.fit, dollop.SequencedLDS),
     "configure": ((RIGHT, 2.35), "environment\nconfiguration", standing_boxes, dollop.Environment),
     "associate": ((MIDDLE, 1.6), "associating\nsubgoals", dollop.associate, dollop.Association),
     "map": ((LEFT, 0.7), "mapping\ndemonstrations", dollop.match, dollop.Matching),
-    "learn": ((RIGHT, 0.7), "learning the\ntask structure", dollop.SubgoalHMM.fit, dollop.SubgoalHMM),
+    "learn": (
+        (RIGHT, 0.7),
+        "learning the\ntask structure",
+        dollop.SubgoalHMM.fit,
+        dollop.SubgoalHMM,
+    ),
     "new": ((LEFT, -0.02), "a new\nenvironment", dollop.observe, dollop.Observation),
     "adapt": ((MIDDLE, -0.02), "updating\nsubgoals", dollop.Task.adapt, dollop.Task),
     "perform": ((RIGHT, -0.02), "performing\nthe task", dollop.perform, dollop.Run),
 }
 WAY_ON = """log-observe background-observe observe-subgoals observe-configure subgoals-associate
 configure-associate associate-map map-learn learn-adapt new-adapt adapt-perform"""
-FRAMES = (  # lower left corner, width and height, what holds for the stages in it, and where that stands
+FRAMES = (  # lower left corner, width and height, what holds for the stages in it, and on which side
     ((0.03, 1.28), (3.34, 2.2), "once per\ndemonstration", "left"),
     ((0.03, 0.38), (3.34, 0.84), "all demonstrations: learn → Task", "right"),
 )
@@ -97,7 +107,14 @@ def draw_step(ax, before, after):
     """An arrow from one stage's edge to the next one's."""
     sideways, upwards = np.sign(np.subtract(after, before))
     half = np.divide(STAGE, 2) * ((sideways, 0) if before[1] == after[1] else (0, upwards))
-    look = {"arrowstyle": "-|>", "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 7, "color": "black"}
+    look = {
+        "arrowstyle": "-|>",
+        "linewidth": 0.9,
+        "shrinkA": 0,
+        "shrinkB": 0,
+        "mutation_scale": 7,
+        "color": "black",
+    }
     ax.annotate("", after - half, before + half, arrowprops=look, zorder=4)
 
 
@@ -106,8 +123,8 @@ def figure_3():
     """Sample laser scan.
 
     The robot sits at the bottom. Every dot is where a beam ended; behind each can and behind the
-    user lies a shadow. The names are the laboratory's, for the reader: nothing in the scan says which
-    dots are a person, and of a stool there is no more than its column.
+    user lies a shadow. The names are the laboratory's, for the reader: nothing in the scan says
+    which dots are a person, and of a stool there is no more than its column.
     """
     recording = recordings.figure_eights().recording
     log, i = recording.log, scan_beside_the_cans(recording.log)
@@ -142,10 +159,11 @@ FURNITURE = (  # name, where it stands, where that is written
 
 
 def named(recording, i):
-    """What the beams of a scan meet: name, where it is (2,), where that is written (2,), in m, and a colour."""
+    """What a scan's beams meet: name, where it is (2,) and is written (2,), in m, and a colour."""
     log, truth = recording.log, recording.truth
     user = np.array([np.interp(log.t[i], truth.t, truth[axis]) for axis in "xy"])
-    things = [("can", place, plot.OBSTACLE) for place in recording.scene.positions] + [("user", user, plot.USER)]
+    things = [("can", place, plot.OBSTACLE) for place in recording.scene.positions]
+    things.append(("user", user, plot.USER))
     for name, place, colour in things:
         sight = place - log.poses[i, :2]
         yield name, place, place + BEHIND * sight / np.linalg.norm(sight), colour
@@ -162,13 +180,14 @@ def figure_4():
     """Flow diagram for observing the user.
 
     Every stage of the paper's method with its own intermediate picture. Above, the whole room: the
-    background map explains walls and desks, and what is left are foreground cells. All else is drawn
-    from the dotted window on, as large as there is room: one can, and the user who walks round it.
-    Foreground cells (blue) go two ways. A quick foreground grid follows the user: the darker a cell,
-    the more often it was hit of late; its blobs are the foreground objects, a colour and a shape each,
-    with their centroids (plus), and tracking these tells the user (blue) from what stands still
-    (dark). A second, slower grid forgets the user and keeps the static objects. The two stages of the
-    slower grid are drawn after the whole recording, all others at one moment of it.
+    background map explains walls and desks, and what is left are foreground cells. All else is
+    drawn from the dotted window on, as large as there is room: one can, and the user who walks
+    round it. Foreground cells (blue) go two ways. A quick foreground grid follows the user: the
+    darker a cell, the more often it was hit of late; its blobs are the foreground objects, a colour
+    and a shape each, with their centroids (plus), and tracking these tells the user (blue) from
+    what stands still (dark). A second, slower grid forgets the user and keeps the static objects.
+    The two stages of the slower grid are drawn after the whole recording, all others at one moment
+    of it.
     """
     shown, grid = recordings.figure_eights(), recordings.background_map()
     log, observation = shown.recording.log, shown.observed_as_paper
@@ -182,7 +201,8 @@ def figure_4():
     plot.scan(stages["laser scan"], log, i, label=None)
     plot.grid_map(stages["background map"], grid, colour="black")
     for ax in axes[0]:
-        plot.boxes(ax, [np.ravel(WINDOW)], None, plot.BACKGROUND, linewidth=0.8, linestyle=":", zorder=6)
+        look = {"linewidth": 0.8, "linestyle": ":", "zorder": 6}
+        plot.boxes(ax, [np.ravel(WINDOW)], None, plot.BACKGROUND, **look)
     points = endpoints(log)[i]
     cells = foreground_mask(points, grid)
     stages["foreground cells"].plot(*points[cells].T, "s", color=plot.USER, markersize=2.5)
@@ -198,7 +218,10 @@ def figure_4():
     return figure, {}
 
 
-ROOM, WINDOW = ((-0.1, -0.1), (9.1, 7.1)), ((5.9, 2.15), (8.5, 4.2))  # m, lower left and upper right corners
+ROOM, WINDOW = (
+    ((-0.1, -0.1), (9.1, 7.1)),
+    ((5.9, 2.15), (8.5, 4.2)),
+)  # m, lower left and upper right corners
 STAGES = (  # two columns
     *("laser scan", "background map", "foreground cells", "slower foreground grid"),
     *("foreground grid", "static objects", "foreground objects", "tracks, and the user"),
@@ -215,7 +238,7 @@ FLOW = (
 
 
 def framed(ax, corners, scale):
-    """A part of the plane in a frame, in which a scale of one metre begins at shares of width and height."""
+    """A part of the plane in a frame, with a metre that begins at shares of its width and height."""
     (left, low), (right, high) = corners
     ax.set(xlim=(left, right), ylim=(low, high), xticks=(), yticks=(), aspect="equal")
     ax.spines[["top", "right"]].set_visible(True)
@@ -292,8 +315,8 @@ def figure_6a():
 
     Orange dots are where the user was out of sight behind a can: the way there is bridged, in the
     paper by Kalman predictions. A laser sees only the near side of a body, so the paper's centroids
-    are too near to it; Dollop's own positions, which are drawn, are the middle of the body, and that
-    bias is gone. The track error is what remains without it.
+    are too near to it; Dollop's own positions, which are drawn, are the middle of the body, and
+    that bias is gone. The track error is what remains without it.
     """
     shown = recordings.figure_eights()
     recording, observation = shown.recording, shown.observation

@@ -30,12 +30,11 @@ EIGHT = {"xlim": (0.9, 8.1), "ylim": (1.9, 5.2)}
 def figure_6b():
     """The subgoals and control law extracted from the demonstrations.
 
-    Crosses are subgoals, where one LDS hands over to the next, numbered in their order; the green line
-    is the response of the sequenced LDS started where the laps start, the arrowheads say which way it
-    is walked. Every
-    LDS alone, as the paper has it, arrives at its subgoal along the direction in which it is
-    slowest: at some it has a corner, the largest of which is told. Dollop's own response, which is
-    drawn, is rounded there. The paper: 6 LDS, 20 mm on average.
+    Crosses are subgoals, where one LDS hands over to the next, numbered in their order; the green
+    line is the response of the sequenced LDS started where the laps start, the arrowheads say which
+    way it is walked. Every LDS alone, as the paper has it, arrives at its subgoal along the
+    direction in which it is slowest: at some it has a corner, the largest of which is told.
+    Dollop's own response, which is drawn, is rounded there. The paper: 6 LDS, 20 mm on average.
     """
     shown = recordings.figure_eights()
     robot, task = shown.recording.log.poses[0], shown.task
@@ -88,11 +87,12 @@ def figure_7a():
     """Ten runs of Agent Orange performing the estimated trajectory of Figure 6b.
 
     (a) and (b): the paper's kind of control, which points along the response of every LDS alone and
-    knows nothing of wheels, so that the robot swings wide in the curves. (c) and (d): Dollop's own, which
-    comes back to what was shown, respects the robot's dynamics and would go round obstacles, but here it
-    meets none. The fan is the starts, each a little off. Under each map every run's distance from that
-    response from where the run started; the map has the response from where the laps start. Dotted lines
-    are where the subgoals are. Of every LDS alone the response has corners there; Dollop's own is rounded.
+    knows nothing of wheels, so that the robot swings wide in the curves. (c) and (d): Dollop's own,
+    which comes back to what was shown, respects the robot's dynamics and would go round obstacles,
+    but here it meets none. The fan is the starts, each a little off. Under each map every run's
+    distance from that response from where the run started; the map has the response from where the
+    laps start. Dotted lines are where the subgoals are. Of every LDS alone the response has corners
+    there; Dollop's own is rounded.
     """
     task, runs_of = recordings.figure_eights().task, by_kind(recordings.eight_runs)
     heights = {"height_ratios": (2, 1, 2, 1)}
@@ -103,7 +103,7 @@ def figure_7a():
         draw_distances(pair[1], task.law, runs, RESPONSES[kind])
     highest = max(ax.get_ylim()[1] for ax in axes[1::2])
     for ax in axes[1::2]:
-        ax.set(ylim=(0, highest))
+        ax.set(ylim=(0, 1.1 * highest))
     titles = [(title, "the same ten runs along their way") for title in TITLES.values()]
     drawing.lettered(axes, sum(titles, ()))
     drawing.legend_below(figure, *axes[::2])
@@ -133,18 +133,19 @@ def pose_errors(run):
 def figure_7b():
     """The response of Agent Orange after being kidnapped.
 
-    Five runs, one a row. A dotted line leads to where the robot was carried, and the number there is the
-    run's. Left the paper's kind of control: it heads for the active subgoal through whatever is in the
-    way, and the circle is the robot where that first ends in a contact; that the paper's robot hit
-    nothing was, as it says, a coincidence. Right Dollop's own, which goes round obstacles. One run may
-    touch an obstacle several times, so contacts and runs with a contact are counted apart. Time to
-    return: until the robot is within ten centimetres of the response from its start and stays there for a
-    second. Dashed green is the response from where the laps start; of every LDS alone it has corners at its
-    subgoals.
+    Five runs, one a row. A dotted line leads to where the robot was carried, and the number there
+    is the run's. Left the paper's kind of control: it heads for the active subgoal through whatever
+    is in the way, and the circle is the robot where that first ends in a contact; that the paper's
+    robot hit nothing was, as it says, a coincidence. Right Dollop's own, which goes round
+    obstacles. One run may touch an obstacle several times, so contacts and runs with a contact are
+    counted apart. Time to return: until the robot is within ten centimetres of the response from
+    its start and stays there for a second. Dashed green is the response from where the laps start;
+    of every LDS alone it has corners at its subgoals.
     """
     task, runs_of = recordings.figure_eights().task, by_kind(recordings.kidnapped_runs)
     count = len(runs_of["plain"])
-    figure, axes = plt.subplots(count, 2, figsize=(drawing.WIDTH, 0.92 * count + 0.9), sharex=True, sharey=True)
+    size = drawing.WIDTH, 0.92 * count + 0.9
+    figure, axes = plt.subplots(count, 2, figsize=size, sharex=True, sharey=True)
     for column, (kind, runs) in zip(axes.T, runs_of.items(), strict=True):
         for k, (ax, run) in enumerate(zip(column, runs, strict=True)):
             draw_kidnapped(ax, task, run, k, RESPONSES[kind])
