@@ -162,8 +162,10 @@ def picture(image):
     """
     height, width = image.shape[:2]
     dpi = JOURNAL["savefig.dpi"]
-    figure = plt.figure(figsize=(width / dpi, height / dpi), layout="none")
-    figure.figimage(image, resize=False)
+    figure = plt.figure(figsize=(width / dpi, height / dpi), dpi=dpi, layout="none")
+    ax = figure.add_axes((0, 0, 1, 1))  # an image without axes is shown by no notebook
+    ax.imshow(image, aspect="auto", interpolation="none")
+    ax.set_axis_off()
     return figure
 
 

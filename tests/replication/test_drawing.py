@@ -92,3 +92,14 @@ def test_lines_and_markers_are_thinner_with_the_style():
             plt.close(figure)
     assert widths["screen"] == [2, 9]
     np.testing.assert_allclose(widths["journal"], np.multiply(widths["screen"], 0.6))
+
+
+def test_a_notebook_shows_all_of_a_picture():
+    """Drawn with the figure's own resolution, as a notebook does, nothing is cut off."""
+    image = np.random.default_rng(0).integers(0, 256, (30, 50, 3), dtype=np.uint8)
+    with plt.rc_context(JOURNAL), io.BytesIO() as stream:
+        figure = picture(image)
+        figure.savefig(stream, format="png", dpi=figure.dpi)
+        saved = np.asarray(Image.open(stream).convert("RGB"))
+        plt.close(figure)
+    np.testing.assert_array_equal(saved, image)

@@ -99,6 +99,7 @@ def show(id):
     except ImportError as error:
         print(f"Figure {id} is not drawn here: {error}")
         return {}
+    plt.draw_if_interactive()  # begins the notebook's way of showing, which the style's end would undo
     with drawing.journal():
         _, metrics = FIGURES[id].draw()
     return as_written(metrics)
