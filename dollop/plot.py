@@ -5,7 +5,8 @@ Tol's: colour-blind readers can tell them apart. Green law and yellow robot are 
 whose red boxes are vermilion here. Black is for what is neutral: subgoals, corners, readings,
 writing.
 
-Everything is drawn into axes that are given; a label goes into their legend once.
+Everything is drawn into axes that are given; a label goes into their legend once. Lines and markers
+are so many points wide under matplotlib's own `lines.linewidth`, and thinner or wider with it.
 """
 
 from io import BytesIO
@@ -35,7 +36,7 @@ _WAIT = "#8A5A00"  # dark orange: times that are written beside a wait
 BACKGROUND = "#8C8C8C"  # grey: the background map, and how things were before
 TRUTH = "#56B4E9"  # light blue: where the user or an object really was
 ROBOT = "#F0E442"  # yellow
-_MOST_LIKELY = "#B0003A"  # crimson: the most-likely path of a CDHMM, red in the paper; first contact of a run
+MOST_LIKELY = "#B0003A"  # crimson: a CDHMM's most-likely path, red in the paper; first contacts
 LATER = LinearSegmentedColormap.from_list("later", ["#9ECAE9", "#08306B"])  # blue, darker with time
 _FLOOR = "#E8E8E8"  # palest grey: free floor of a map
 _RAY = "#C3CED6"  # pale grey: the laser's rays
@@ -52,6 +53,9 @@ _RIM = 0.25
 
 HALO = withStroke(linewidth=2.5, foreground="white")
 """Keeps writing legible where it lies over lines."""
+
+_LINE = 1.5
+"""matplotlib's own `lines.linewidth`, in points."""
 
 STYLE = {
     "figure.dpi": 100,
@@ -73,6 +77,11 @@ def style():
     context manager
     """
     return plt.rc_context(STYLE)
+
+
+def _pt(points):
+    """So many points, more or fewer where a style's lines are wider or thinner than matplotlib's."""
+    return points * plt.rcParams["lines.linewidth"] / _LINE
 
 
 def plane(ax=None, title=None):
@@ -190,7 +199,7 @@ def boxes(ax, boxes, label=None, colour=OBSTACLE, **look):
     **look
         Options of `matplotlib.patches.Rectangle`.
     """
-    look = {"fill": False, "edgecolor": colour, "linewidth": 2, "label": label} | look
+    look = {"fill": False, "edgecolor": colour, "linewidth": _pt(2), "label": label} | look
     for x0, y0, x1, y1 in checked_boxes(boxes):
         ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **look))
         look["label"] = None
@@ -209,8 +218,10 @@ def robot(ax, pose, radius=_RIM, label=None):
     label : str, optional
     """
     (x, y, theta), radius = checked_positions("pose", pose, 3), checked_number("radius", radius, 0)
-    ax.add_patch(Circle((x, y), radius, facecolor=ROBOT, edgecolor="black", zorder=4))
-    ax.plot([], [], "o", color=ROBOT, markeredgecolor="black", markersize=10, label=label)
+    edge = {"linewidth": _pt(1), "zorder": 4}
+    ax.add_patch(Circle((x, y), radius, facecolor=ROBOT, edgecolor="black", **edge))
+    look = {"color": ROBOT, "markeredgecolor": "black", "markeredgewidth": _pt(1)}
+    ax.plot([], [], "o", markersize=_pt(10), label=label, **look)
     ahead = [x, x + radius * np.cos(theta)], [y, y + radius * np.sin(theta)]
     ax.plot(*ahead, color="black", zorder=5)
 
@@ -267,8 +278,8 @@ def scan(ax, log, i, label="laser scan"):
     x, y, _ = log.poses[i]
     xs, ys = endpoints(log)[i, np.isfinite(log.ranges[i])].T
     rays = np.stack([np.full_like(xs, x), xs]), np.stack([np.full_like(ys, y), ys])
-    ax.plot(*rays, color=_RAY, linewidth=0.5)
-    ax.plot(xs, ys, ".", color="black", markersize=3, label=label)
+    ax.plot(*rays, color=_RAY, linewidth=_pt(0.5))
+    ax.plot(xs, ys, ".", color="black", markersize=_pt(3), label=label)
 
 
 def path(ax, positions, label=None, colour=USER, **look):
@@ -287,7 +298,7 @@ def path(ax, positions, label=None, colour=USER, **look):
     positions = checked_array("positions", positions, "N", "d", finite=False)
     if positions.shape[1] not in (2, 3):
         raise ValueError(f"positions must be of 2 or 3 columns, got {positions.shape[1]}")
-    ax.plot(*positions.T[:2], color=colour, label=label, **({"linewidth": 1} | look))
+    ax.plot(*positions.T[:2], color=colour, label=label, **({"linewidth": _pt(1)} | look))
 
 
 def track(ax, track, label="track", **look):
@@ -302,7 +313,7 @@ def track(ax, track, label="track", **look):
         Options of `path`.
     """
     path(ax, track.positions, label, **look)
-    dots = {"color": OCCLUDED, "markersize": 4, "zorder": 3, "label": "occluded"}
+    dots = {"color": OCCLUDED, "markersize": _pt(4), "zorder": 3, "label": "occluded"}
     ax.plot(*track.positions[track.occluded].T, ".", **dots)
 
 
@@ -316,8 +327,22 @@ def subgoals(ax, subgoals, label="subgoals"):
         In m.
     label : str, optional
     """
-    look = {"color": SUBGOAL, "markersize": 9, "markeredgewidth": 2.5, "zorder": 6}
+    look = {"color": SUBGOAL, "markersize": _pt(9), "markeredgewidth": _pt(2.5), "zorder": 6}
     ax.plot(*checked_positions("subgoals", subgoals).T, "x", label=label, **look)
+
+
+def start(ax, place, label="start"):
+    """Where a law, a walk or a path begins.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    place : (2,) array_like
+        In m.
+    label : str, optional
+    """
+    look = {"color": LAW, "markeredgecolor": "black", "markeredgewidth": _pt(1), "zorder": 6}
+    ax.plot(*checked_positions("place", place, 2), "o", markersize=_pt(8), label=label, **look)
 
 
 def law(ax, response, label="control law", **look):
@@ -332,46 +357,49 @@ def law(ax, response, label="control law", **look):
     **look
         Options of `path`.
     """
-    response, look = checked_positions("response", response), {"linewidth": 2, "colour": LAW} | look
+    response = checked_positions("response", response)
+    look = {"linewidth": _pt(2), "colour": LAW} | look
     path(ax, response, label, **look)
     walked = arc_length(response)
-    head = {"mutation_scale": 18, "color": look["colour"], "linewidth": 0}
+    head = {"mutation_scale": _pt(18), "color": look["colour"], "linewidth": 0}
     for share in _HEADS_AT:
         k = np.searchsorted(walked, share * walked[-1]).clip(1, len(response) - 1)
         _arrow(ax, response[k - 1], response[k], **head)
 
 
-def runs(ax, runs):
+def runs(ax, runs, first=0):
     """Where the robot went.
 
-    Kidnapped runs have a look and a number each; the kidnapping is a dotted leap to a numbered dot.
+    Kidnapped runs have a look each, where there are several, and a number; the kidnapping is a dotted
+    leap to a numbered dot.
     A circle is the rim of the robot where a run first touched something.
 
     Parameters
     ----------
     ax : matplotlib.axes.Axes
     runs : sequence of Run
+    first : int
+        Of which number the first is, from 0, where runs are drawn one by one.
     """
     apart, label = any(len(run.kidnapped) for run in runs), "kidnapped"
-    for k, run in enumerate(runs):
-        look = {"linewidth": 0.9, "alpha": 0.8, "colour": RUN}
-        if apart:
+    for k, run in enumerate(runs, first):
+        look = {"linewidth": _pt(0.9), "alpha": 0.8, "colour": RUN}
+        if apart and len(runs) > 1:
             shade, line = _RUN_SHADES[k % 5], _RUN_LINES[k % 5]
-            look = {"linewidth": 1.2, "colour": shade, "linestyle": line}
+            look = {"linewidth": _pt(1.2), "colour": shade, "linestyle": line}
         places = run.true_poses[:, :2]
         leaps = _leaps(run)
         for n, part in enumerate(np.split(places, leaps)):
-            path(ax, part, "robot's runs" if k == n == 0 else None, **look)
+            path(ax, part, None if n or k > first else "robot's runs", **look)
         for leap in leaps:
             path(ax, places[leap - 1 : leap + 1], label, "black", linestyle=":")
             label = None
-            ax.plot(*places[leap], "o", color="black", markersize=4, zorder=6)
+            ax.plot(*places[leap], "o", color="black", markersize=_pt(4), zorder=6)
             _write(ax, k + 1, places[leap], (0, 9), ha="center", va="center", weight="bold")
-    hit = [run for run in runs if run.collisions]
-    _contacts(ax, hit)
+    _contacts(ax, [run for run in runs if run.collisions], width=_pt(0.8))
 
 
-_TOUCHING = {"colour": _MOST_LIKELY, "width": 2.0}
+_TOUCHING = {"colour": MOST_LIKELY, "width": 2.0}
 """Look of the rim where a run touched something: otherwise than the robot at the end, which may stand there."""
 
 
@@ -381,8 +409,8 @@ def _contacts(ax, runs, colour="black", width=0.8):
         rim = {"fill": False, "edgecolor": colour, "linewidth": width, "zorder": 7}
         ax.add_patch(Circle(_first_contact(run), getattr(run, "radius", _RIM), **rim))
     if runs:
-        look = {"color": colour, "markersize": 10, "fillstyle": "none", "markeredgewidth": width}
-        ax.plot([], [], "o", label="first contact, robot's rim", **look)
+        look = {"color": colour, "fillstyle": "none", "markeredgewidth": width}
+        ax.plot([], [], "o", markersize=_pt(10), label="first contact, robot's rim", **look)
 
 
 def _first_contact(run):
@@ -417,15 +445,7 @@ def task(ax, task):
     law(ax, task.law.response(), "way of the task")
     subgoals(ax, task.law.subgoals)
     _numbers(ax, task.law)
-    ax.plot(
-        *task.law.start,
-        "o",
-        color=LAW,
-        markeredgecolor="black",
-        markersize=8,
-        zorder=6,
-        label="start",
-    )
+    start(ax, task.law.start)
     _waits(ax, task.law)
 
 
@@ -623,17 +643,17 @@ def cdhmm(ax, model, sd=2.0):
     steps = np.argwhere(model.transitions > 0).tolist()
     if any((u, v) not in path_steps for u, v in steps):
         ax.plot([], [], color=BACKGROUND, label="other steps")
-    ax.plot([], [], color=_MOST_LIKELY, label="most-likely path")
+    ax.plot([], [], color=MOST_LIKELY, label="most-likely path")
     for u, v in steps:
-        colour = _MOST_LIKELY if (u, v) in path_steps else BACKGROUND
-        width = 0.5 + 2.0 * model.transitions[u, v]
+        colour = MOST_LIKELY if (u, v) in path_steps else BACKGROUND
+        width = _pt(0.5 + 2.0 * model.transitions[u, v])
         _arrow(ax, *model.means[[u, v]], color=colour, linewidth=width, shrinkB=2)
     for state, (mean, covariance) in enumerate(zip(model.means, model.covariances, strict=True)):
         _ellipse(ax, mean, covariance, sd, None if state else f"states, {sd:g} sd")
         _write(ax, state, mean, (6, 6))
     _write(ax, "start", model.means[way[0]], (-8, 0), ha="right", va="center", style="italic")
     _write(ax, "end", model.means[way[-1]], (14, -6), va="center", style="italic")
-    ax.plot(*model.means.T, ".", color=SUBGOAL, markersize=6, zorder=7)
+    ax.plot(*model.means.T, ".", color=SUBGOAL, markersize=_pt(6), zorder=7)
 
 
 def _arrow(ax, tail, head, **look):

@@ -143,6 +143,21 @@ def test_a_scene_shows_what_the_laser_meets_and_who_walks(ax):
     np.testing.assert_allclose(ax.lines[0].get_xydata()[-1], (2.0, 4.0), atol=0.2)
 
 
+def test_a_start_is_a_dot_where_it_is(ax):
+    """Named once, over what is drawn there."""
+    plot.start(ax, (1.0, 2.0))
+    (dot,) = ax.lines
+    np.testing.assert_array_equal(dot.get_xydata(), [(1.0, 2.0)])
+    assert labels(ax) == ["start"]
+
+
+def test_a_run_drawn_by_itself_has_its_own_number(ax):
+    """The third of several, in axes of its own: a 3 where it was put, the look of every other run."""
+    plot.runs(ax, [run(kidnapped=[2.0])], first=2)
+    assert "3" in [text.get_text() for text in ax.texts]
+    assert ax.lines[0].get_color() == plot.RUN and labels(ax) == ["robot's runs", "kidnapped"]
+
+
 def test_runs_look_alike_unless_one_is_kidnapped(ax):
     """One colour, one label, and no number."""
     plot.runs(ax, [run(), run()])

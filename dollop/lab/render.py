@@ -4,6 +4,7 @@ A picture is taken in a simulator of its own that holds nothing else.
 """
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,27 +27,104 @@ ORANGE, PALE = (0.93, 0.36, 0.06), (0.95, 0.94, 0.90)
 BIN, BAG, OAK = (0.33, 0.35, 0.37), (0.10, 0.10, 0.11), (0.72, 0.53, 0.33)
 CHEST = [(0.20, 0.42), (0.205, 0.54), (0.15, 0.60), (0.05, 0.63)]
 TORSO = [(0.10, 0.0), (0.165, 0.02), (0.16, 0.15), *CHEST]
+TYRE, METAL = (0.10, 0.10, 0.10), (0.66, 0.67, 0.70)
+TREAD = [(0.050, -0.020), (0.074, -0.020), (0.081, -0.014), (0.0835, -0.007)]
+RIM = [(0.050, 0.012), (0.046, 0.014), (0.040, 0.008), (0.020, 0.010), (0.017, 0.022), (0.0, 0.022)]
+"""Radius and height in m of half a tyre, and of a wheel's outer side, over the wheel's middle."""
+SHOWN_WALLS = 4.3
+"""m, to which walls are raised in a picture of the laboratory: nothing is seen above them."""
+LAMP = np.array([-0.35, -0.45, 0.82])
+"""Where the light comes from: the same as in a single picture."""
+SOFT = 0.12
+"""How far round its middle the light reaches where pictures are averaged, by its distance."""
 
 
-def render_robot(width=1200, height=900):
+class Studio(Engine):
+    """An engine whose pictures can be averaged: edges are smooth then, and shadows soft."""
+
+    def photograph(self, eye, target, view_angle, width, height, passes=1):
+        """As of `Engine`, or the mean of so many, each with light and pixels a little aside.
+
+        Parameters
+        ----------
+        eye, target : (3,) sequence of float
+            From where and whereto, in m.
+        view_angle : float
+            From top to bottom, in degrees.
+        width, height : int
+            Pixels.
+        passes : int
+
+        Returns
+        -------
+        (height, width, 3) uint8 array
+        """
+        if passes == 1:
+            return super().photograph(eye, target, view_angle, width, height)
+        eye, target = self._recentred(eye, target)
+        view = self._call("computeViewMatrix", eye, target, (0.0, 0.0, 1.0))
+        seen_by = view_angle, width / height, 0.1, 20.0
+        lens = np.array(self._call("computeProjectionMatrixFOV", *seen_by))
+        total = np.zeros((height, width, 3))
+        for aside, light in zip(scattered(passes), scattered(passes, 7), strict=True):
+            seen = lens.copy()
+            seen[8:10] += 2 * aside / (width, height)  # by a fraction of a pixel
+            towards = LAMP + SOFT * np.array([*(2 * light), 0.0])
+            told = {"viewMatrix": view, "projectionMatrix": seen.tolist()}
+            told["lightDirection"] = towards.tolist()
+            pixels = self._call("getCameraImage", width, height, **told, **LAMPS)[2]
+            total += np.reshape(pixels, (height, width, 4))[..., :3]
+        return np.round(total / passes).astype(np.uint8)
+
+
+LAMPS = {
+    "lightDistance": 12,
+    "lightAmbientCoeff": 0.60,
+    "lightDiffuseCoeff": 0.45,
+    "lightSpecularCoeff": 0.12,
+    "shadow": 1,
+}
+"""Softer than in a single picture."""
+
+
+def scattered(count, skipped=0):
+    """Places spread evenly over the square from -0.5 to 0.5 (Roberts' sequence).
+
+    Parameters
+    ----------
+    count : int
+    skipped : int
+        How many of the sequence are left out before.
+
+    Returns
+    -------
+    (count, 2) float array
+    """
+    steps = np.array([0.7548776662466927, 0.5698402909980532])
+    return np.arange(1 + skipped, 1 + skipped + count)[:, None] * steps % 1.0 - 0.5
+
+
+def render_robot(width=1200, height=900, passes=1):
     """Agent Orange in the laboratory, three quarters from the front (Fig. 1).
 
     Parameters
     ----------
     width, height : int
         Pixels.
+    passes : int
+        Pictures that are averaged, for smooth edges and soft shadows.
 
     Returns
     -------
     (height, width, 3) uint8 array
     """
-    with Engine() as studio:
+    with Studio() as studio:
         furnish(studio, LABORATORY)
-        put_pioneer(studio, (4.5, 3.2, -2.0))
-        return studio.photograph((4.72, 2.02, 0.56), (4.51, 3.2, 0.24), 31.0, width, height)
+        show_robot(studio, (4.5, 3.2, -2.0))
+        return studio.photograph((4.72, 2.02, 0.56), (4.51, 3.2, 0.24), 31.0, width, height, passes)
 
 
-def render_lab(scene=None, walkers=(), width=1200, height=900):
+def render_lab(scene=None, walkers=(), width=1200, height=900, passes=1):
     """A room with robot and objects, from above the wall at its lower end (Fig. 5).
 
     Parameters
@@ -58,6 +136,8 @@ def render_lab(scene=None, walkers=(), width=1200, height=900):
         `Walk.at` gives them.
     width, height : int
         Pixels.
+    passes : int
+        Pictures that are averaged, for smooth edges and soft shadows.
 
     Returns
     -------
@@ -66,30 +146,38 @@ def render_lab(scene=None, walkers=(), width=1200, height=900):
     scene = scene or figure_eight_scene()
     for name, pixels in (("width", width), ("height", height)):
         checked_number(name, pixels, 1, 10_000)
-    with Engine() as studio:
+    with Studio() as studio:
         furnish(studio, scene.room)
         for each in scene.objects:
             show_object(studio, each)
-        put_pioneer(studio, scene.robot.pose)
+        show_robot(studio, scene.robot.pose)
         for walker in walkers:
             show_person(studio, *walker)
-        return studio.photograph(*viewpoint(scene.room), 50.0, width, height)
+        return studio.photograph(*viewpoint(scene.room), 50.0, width, height, passes)
 
 
 def viewpoint(room):
     """From where and whereto a picture of a room is taken, (3,) and (3,) in m: higher up for larger rooms."""
     left, low, right, high = room.bounds
-    scale = max((right - left) / 9.0, (high - low) / 7.0)
+    scale = scale_of(room)
     middle = (left + right) / 2
     eye = middle - 2.3 * scale, low - 3.6 * scale, 4.3 * scale
     return eye, (middle - 0.05, low + 3.4 / 7.0 * (high - low), 0.25)
+
+
+def scale_of(room):
+    """How much larger a room is than the laboratory."""
+    left, low, right, high = room.bounds
+    return max((right - left) / 9.0, (high - low) / 7.0)
 
 
 def furnish(studio, room):
     """Floor, furniture and the walls that do not stand before the camera, those opposite with skirtings."""
     show_floor(studio, room.bounds)
     eye, target = (np.array(place[:2]) for place in viewpoint(room))
-    for corner, end, wall in zip(room.corners, np.roll(room.corners, -1, axis=0), walls(room), strict=True):
+    raised = walls(replace(room, height=max(room.height, SHOWN_WALLS * scale_of(room))))
+    ends = np.roll(room.corners, -1, axis=0)
+    for corner, end, wall in zip(room.corners, ends, raised, strict=True):
         along = (end - corner) / np.linalg.norm(end - corner)
         inwards = np.array([-along[1], along[0]])
         if (eye - corner) @ inwards > 0:
@@ -227,6 +315,26 @@ def show_cone(studio, each):
         show_lathed(studio, (*each.position, 0.0), [(radius(low), low), (radius(high), high)], colour)
 
 
+def show_robot(studio, pose):
+    """The Pioneer at a pose (3,) in m and rad, over its wheels rounder ones than PyBullet draws."""
+    put_pioneer(studio, pose)
+    x, y, theta = pose
+    for side in (1, -1):
+        axle = rotation(theta) @ (0.0, 0.1585 * side)
+        outwards = np.array([*(rotation(theta) @ (0.0, side)), 0.0])
+        centre, turn = np.array([x, y, 0.0825]) + (*axle, 0.0), from_vertical(outwards)
+        tyre = TREAD + [(radius, -height) for radius, height in TREAD[::-1]]
+        show_lathed(studio, centre, tyre, TYRE, orientation=turn)
+        show_lathed(studio, centre, [(0.052, 0.020), (0.050, 0.012)], TYRE, orientation=turn)
+        show_lathed(studio, centre, RIM, METAL, orientation=turn)
+
+
+def from_vertical(along):
+    """The quaternion that turns the vertical to a direction (3,), which is not straight down."""
+    turn = np.array([-along[1], along[0], 0.0, np.linalg.norm(along) + along[2]])
+    return turn / np.linalg.norm(turn)
+
+
 def show_person(studio, position, heading, phase):
     """A person in mid-step, for the eye only: the laser meets the simpler body of `World`."""
     turn = np.eye(3)
@@ -260,10 +368,8 @@ def show_limb(studio, start, end, radii, colour):
     """A tapered limb from start (3,) to end (3,) in m, round at both."""
     along = end - start
     length = np.linalg.norm(along)
-    turn = np.array([-along[1], along[0], 0.0, length + along[2]])
-    turn /= np.linalg.norm(turn)  # the quaternion from the vertical to `along`
     profile = [(0.0, -radii[0]), (radii[0], 0.0), (radii[1], length), (0.0, length + radii[1])]
-    show_lathed(studio, start, profile, colour, orientation=turn)
+    show_lathed(studio, start, profile, colour, orientation=from_vertical(along))
 
 
 def ellipse(radius, half_height, steps=12):

@@ -40,6 +40,8 @@ NAMES = {
     "states_before": ("states before merging", ""),
     "states_after": ("states after", ""),
     "path_length": ("states on the most-likely path", ""),
+    "demonstrations": ("demonstrations", ""),
+    "states_aside": ("states beside the most-likely path", ""),
     "spread_m": ("prior spread, one standard deviation", "m"),
     "mean_sd_m": ("standard deviation of a state, mean", "m"),
     "passed_on_the_demonstrated_side": ("runs that pass every cone on the demonstrated side", ""),

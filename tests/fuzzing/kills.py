@@ -213,7 +213,7 @@ def replication():
 
     names = "figure_eights", "moved_cones", "slalom_0", "slalom_1"
     shown = [(f"{name}.log.gz", f"{name}_truth.csv", f"{name}_scene.json") for name in names]
-    yield Writer("figures", figure, (("metrics.json", "README.md", "fig_08.png"),), (), True)
+    yield Writer("figures", figure, (("metrics.json", "README.md", "fig_08.png", "fig_08.pdf"),), (), True)
     yield Writer("data", data, (("empty_lab.log.gz", "lab.yaml", "lab.pgm"), *shown), (), True)
     written = "REPLICATION.md", "study/worlds.json", "study/worlds_worst.png"
     yield Writer("worlds", worlds, (written,), (ROOT / "REPLICATION.md",), True)

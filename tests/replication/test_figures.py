@@ -3,16 +3,21 @@
 import json
 from types import SimpleNamespace
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.text import Text
 from places import ROOT
 
 import dollop
 from dollop import figures as door
 from dollop.checks import EXTRAS
-from dollop.replication import baseline, figures, peers, recordings
-from dollop.replication.figures import moved
-from dollop.replication.figures.controls import CONTROLS, RESPONSES, numbers
+from dollop.environment import spring_forces
+from dollop.replication import baseline, drawing, figures, peers, recordings
+from dollop.replication.figures import learning, moved, observing, performing
+from dollop.replication.figures.controls import CONTROLS, RESPONSES, along_response, numbers
 from dollop.replication.figures.performing import law_numbers
 from dollop.replication.layouts import matching_shares
 from dollop.replication.runs import distances_to_law
@@ -27,14 +32,23 @@ def lab():
 
 
 def test_every_panel_is_committed():
-    """Each figure has its picture and its entry in metrics.json."""
+    """Each figure has its picture, its PDF where it is drawn, and its entry in metrics.json."""
     folder = ROOT / "figures"
     for panel in figures.FIGURES.values():
         assert panel.id in COMMITTED
         assert (folder / panel.picture).stat().st_size > 5_000
+        if panel.printed:
+            assert (folder / panel.printed).read_bytes().startswith(b"%PDF-")
+    assert [panel.id for panel in figures.FIGURES.values() if panel.rendered] == ["1", "5"]
 
 
-@pytest.mark.parametrize("panel", ["3", "6a", "6b", "8", "10a", "11a", "12a"])
+def test_what_is_committed_is_small():
+    """All pictures for the screen, and all PDFs, are a few megabytes."""
+    for kind, most in (("png", 8e6), ("pdf", 2e6)):
+        assert sum(path.stat().st_size for path in (ROOT / "figures").glob(f"*.{kind}")) < most
+
+
+@pytest.mark.parametrize("panel", ["3", "6a", "6b", "8", "10a", "11a", "12a", "x4"])
 def test_fresh_numbers_equal_the_committed_ones(panel, tmp_path):
     """Simulated anew from the seed, a panel's numbers are those of metrics.json."""
     pytest.importorskip("pybullet")
@@ -45,13 +59,212 @@ def test_fresh_numbers_equal_the_committed_ones(panel, tmp_path):
 
 
 def test_the_same_figure_twice_is_the_same_file(tmp_path):
-    """PNGs are byte-identical on one machine."""
+    """PNG and PDF are byte-identical on one machine, and in neither is a date."""
     pytest.importorskip("pybullet")
     first, second = tmp_path / "a", tmp_path / "b"
     for folder in (first, second):
         folder.mkdir()
         figures.make("6b", folder)
-    assert (first / "fig_06b.png").read_bytes() == (second / "fig_06b.png").read_bytes()
+    for name in ("fig_06b.png", "fig_06b.pdf"):
+        assert (first / name).read_bytes() == (second / name).read_bytes()
+    assert b"Date" not in (first / "fig_06b.pdf").read_bytes()
+
+
+def test_png_and_pdf_are_written_together_or_neither(tmp_path, monkeypatch):
+    """Where the PNG cannot be written, the PDF of before stays too, and nothing else is left."""
+    savefig = Figure.savefig
+
+    def failing(figure, stream, format, **how):
+        if format == "png":
+            raise OSError("no room")
+        savefig(figure, stream, format=format, **how)
+
+    (tmp_path / "fig_02.pdf").write_bytes(b"%PDF-1.4 as before")
+    monkeypatch.setattr(Figure, "savefig", failing)
+    with pytest.raises(OSError, match="no room"):
+        figures.make("2", tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["fig_02.pdf"]
+    assert (tmp_path / "fig_02.pdf").read_bytes() == b"%PDF-1.4 as before"
+
+
+# ---- what a journal asks for
+
+
+@pytest.fixture(scope="module")
+def few_runs():
+    """Two runs in the place of ten: what is drawn of them is the same."""
+    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
+
+    def two(work):
+        return {kind: work(*choices, count=2) for kind, (_, choices) in CONTROLS.items()}
+
+    with pytest.MonkeyPatch.context() as fewer:
+        for module in (performing, learning):
+            fewer.setattr(module, "by_kind", two)
+        yield
+
+
+DRAWN = ("2", "3", "4", "6a", "6b", "7a", "7b", "8", "9", "10a", "11a", "11b", "12a", "12b", "x4")
+"""Panels that are quickly drawn, given a few runs; 10b is made of the parts of 7a and 10a."""
+
+
+@pytest.fixture(scope="module")
+def printed(few_runs):
+    """Every one of these panels, drawn once."""
+    with drawing.journal():
+        drawn = {id: figures.FIGURES[id].draw()[0] for id in DRAWN}
+    for figure in drawn.values():
+        figure.canvas.draw()
+    yield drawn
+    for figure in drawn.values():
+        plt.close(figure)
+
+
+def written(figure):
+    """Everything that is written in a figure, and shown."""
+    hidden = set(labels_off_the_axes(figure))
+    texts = (text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip())
+    return [text for text in texts if text not in hidden and (text.axes is None or shown(text))]
+
+
+def shown(text):
+    """Whether what is written in axes is shown: axes that are switched off have no labels."""
+    return text.axes.axison or text not in (text.axes.xaxis.label, text.axes.yaxis.label)
+
+
+def labels_off_the_axes(figure):
+    """Labels of ticks that are not drawn: of axes that are switched off, or beyond what an axis shows."""
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            for tick in axis.get_major_ticks() + axis.get_minor_ticks():
+                if not (ax.axison and low - 1e-9 <= tick.get_loc() <= high + 1e-9):
+                    yield from (tick.label1, tick.label2)
+
+
+@pytest.mark.parametrize("id", DRAWN)
+def test_a_figure_printed_in_a_column_can_be_read(id, printed):
+    """In a column of 3.4 inches all type is of 6 points and more."""
+    figure = printed[id]
+    sizes = {text.get_text(): text.get_fontsize() * 3.4 / figure.get_figwidth() for text in written(figure)}
+    assert sizes and min(sizes.values()) >= 6, sizes
+
+
+@pytest.mark.parametrize("id", DRAWN)
+def test_nothing_is_written_beyond_the_paper(id, printed):
+    """Every word lies in its figure."""
+    figure = printed[id]
+    for text in written(figure):
+        box = text.get_window_extent()
+        inside = box.x0 >= -2 and box.y0 >= -2 and box.x1 <= figure.bbox.x1 + 2 and box.y1 <= figure.bbox.y1 + 2
+        assert inside, (text.get_text(), box)
+
+
+@pytest.mark.parametrize("id", DRAWN)
+def test_several_axes_have_letters(id, printed):
+    """Where a figure has several axes with a title, they are (a), (b), ... in order."""
+    titles = [ax.get_title(loc=side) for ax in printed[id].axes for side in ("left", "center")]
+    letters = [title[:3] for title in titles if title]
+    assert letters == [f"({letter})" for letter in "abcdefgh"[: len(letters)]]
+    assert bool(letters) == (len(printed[id].axes) > 1)
+
+
+def test_the_start_and_the_order_of_subgoals_are_shown(printed):
+    """Wherever subgoals are drawn: a start, and a number for each from 1 on."""
+    for id in ("6b", "7a", "10a", "11a", "11b", "12b"):
+        ax = printed[id].axes[0]
+        labels = ax.get_legend_handles_labels()[1]
+        assert {"start", "subgoals, in order"} <= set(labels), id
+        numbers = [text.get_text() for text in ax.texts if text.get_text().isdigit()]
+        assert numbers == [str(k + 1) for k in range(len(numbers))] and len(numbers) > 3, id
+
+
+def test_corners_of_the_law_are_named(printed):
+    """The legend says which response is drawn: rounded at the subgoals, or of every LDS alone, with corners."""
+    for id, methods in {"6b": ["held"], "7a": ["held", "paper"], "10a": ["held"], "12b": ["held", "paper"]}.items():
+        labels = {text.get_text() for text in printed[id].legends[0].get_texts()}
+        assert {drawing.RESPONSES[method] for method in methods} == labels & set(drawing.RESPONSES.values())
+
+
+def test_nothing_is_moved_in_figure_8(printed):
+    """Before and now, every box is where it is, and both are drawn to one scale."""
+    before, now = printed["8"].axes
+    for ax, environment in (
+        (before, recordings.figure_eights().task.environment),
+        (now, recordings.moved_environment(0)),
+    ):
+        drawn = [patch.get_bbox().extents for patch in ax.patches if isinstance(patch, Rectangle)]
+        np.testing.assert_allclose(drawn, environment.boxes)
+    metre = [np.diff(ax.transData.transform([(0, 0), (1, 1)]), axis=0)[0] for ax in (before, now)]
+    np.testing.assert_allclose(metre, metre[0][0], rtol=1e-3)
+
+
+def test_the_far_force_is_drawn_as_often_longer_as_the_title_says(printed):
+    """Fig. 9 (c): arrows of the other box alone, by the factor in its title, long enough to see."""
+    _, near, far = printed["9"].axes
+    forces = [np.column_stack([ax.collections[0].U, ax.collections[0].V]) for ax in (near, far)]
+    times = float(far.get_title(loc="left").split("×")[1])
+    corners = recordings.figure_eights().task.environment.corners
+    own = spring_forces(corners[:4]), spring_forces(corners[4:])
+    alone = spring_forces(corners) - np.concatenate(own)
+    drawn = forces[1] / times
+    assert any(np.allclose(drawn, part, rtol=1e-9) for part in (alone[:4], alone[4:]))
+    lengths = [np.linalg.norm(each, axis=1).max() for each in forces]
+    assert 0.3 < lengths[1] / lengths[0] <= 1.01
+
+
+def test_what_is_named_in_figure_3_is_met_by_a_beam():
+    """Beside every name the scan has a reading, and all kinds of thing are named."""
+    pytest.importorskip("pybullet")
+    recording = recordings.figure_eights().recording
+    i = observing.scan_beside_the_cans(recording.log)
+    met = dollop.foreground.endpoints(recording.log)[i]
+    names = set()
+    for name, place, _, _ in observing.named(recording, i):
+        names.add(name)
+        assert np.linalg.norm(met - place, axis=1).min() < 0.45, (name, place)
+    assert names == {"can", "user", "desk", "stool", "cabinet", "wall"}
+
+
+def test_distance_along_the_way_grows_through_the_crossing(few_runs):
+    """A run through the figure-eight's crossing is where it is in the lap, not where the other branch passes."""
+    law = recordings.figure_eights().task.law
+    run, _ = recordings.eight_runs(*CONTROLS["own"][1], count=2)
+    along, away = along_response(run, law, "held")
+    assert (np.diff(along) > -0.3).all() and along[0] < 1 and along[-1] > 12
+    np.testing.assert_array_equal(away, distances_to_law(run, law, "held"))
+
+
+def test_the_graphs_of_figure_12a_and_x4_are_whole(printed):
+    """Before merging a state for every subgoal, after it those of the model; in x4 the path goes past a branch."""
+    for id, model in (("12a", recordings.slalom_task().model), ("x4", learning.detoured_task().model)):
+        numbers = [text.get_text() for text in printed[id].axes[1].texts if text.get_text().isdigit()]
+        assert len(numbers) == sum(map(len, model.sequences)) + len(model.means)
+    model = learning.detoured_task().model
+    way = set(model.most_likely_path().tolist())
+    aside = set(range(len(model.means))) - way
+    assert aside and aside <= set(model.states[2].tolist())
+    assert (np.count_nonzero(model.transitions, axis=1) > 1).any()
+
+
+@pytest.mark.usefixtures("lab")
+def test_no_void_is_seen_above_the_walls():
+    """The upper edge of Fig. 5 is wall from side to side: nowhere white."""
+    from dollop.lab import render_lab
+
+    image = render_lab(recordings.figure_eights().recording.scene, width=160, height=120)
+    assert image[:3].max() < 245
+
+
+@pytest.mark.usefixtures("lab")
+def test_an_averaged_rendering_has_no_noise():
+    """Light and pixels are shifted in a fixed order: the same picture twice, as bright as a single one."""
+    from dollop.lab import render_robot
+
+    small = {"width": 120, "height": 90}
+    soft, again = (render_robot(**small, passes=4) for _ in range(2))
+    np.testing.assert_array_equal(soft, again)
+    assert abs(soft.mean() - render_robot(**small).mean()) < 12
 
 
 def test_observing_and_segmenting_are_in_their_bands():
@@ -296,7 +509,7 @@ def test_a_panel_that_is_done_has_its_numbers(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit):
         door.main(["8", "9", "--folder", str(tmp_path)])
     assert "1 of 2 panels are done, with their numbers" in capsys.readouterr().err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["README.md", "fig_08.png", "metrics.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["README.md", "fig_08.pdf", "fig_08.png", "metrics.json"]
     assert json.loads((tmp_path / "metrics.json").read_text()).keys() == {"8"}
     assert "fig_08.png" in (tmp_path / "README.md").read_text()
 

@@ -1,8 +1,8 @@
 """Every numbered figure of the paper, regenerated: python -m dollop.figures [id ...].
 
 Each panel is one function that returns the drawing and its numbers, in the modules named after
-what they show. This one writes a PNG per panel, keeps the numbers in metrics.json, and lays both
-out as a gallery.
+what they show. This one writes a PNG per panel for the screen and a PDF for print, keeps the
+numbers in metrics.json, and lays them out as a gallery.
 """
 
 import argparse
@@ -14,12 +14,11 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from tqdm import tqdm
 
-from dollop import plot
 from dollop.checks import need
 from dollop.formats.files import FormatError
 from dollop.formats.kinds import PNG, Kind
 from dollop.formats.writing import check_writable, together, whole_file
-from dollop.replication import gallery
+from dollop.replication import drawing, gallery
 from dollop.replication.figures import environment, learning, moved, observing, performing  # noqa: F401
 from dollop.replication.figures.panel import PANELS
 
@@ -29,7 +28,11 @@ FIGURES = {each.id: each for each in sorted(PANELS.values(), key=lambda each: ea
 """Every panel by id, in the paper's order; the modules above register theirs when imported."""
 
 METRICS = Kind("numbers of figures", rb'\A\s*\{\s*(?:\}|"\w+": ?\{)')
+PDF = Kind("a PDF", rb"\A%PDF-")
 GALLERY = Kind("a gallery", rb"\A# The figures\n")
+
+UNDATED = {"CreationDate": None, "ModDate": None, "Creator": None, "Producer": None}
+"""What a PDF would tell of when and by what it was made, left out."""
 
 DESCRIPTION = "Make the figures named by id, or all."
 
@@ -40,14 +43,16 @@ def rounded(value):
 
 
 def make(id, folder):
-    """Draw one panel.
+    """Draw one panel, as PNG and as PDF: both are written, or neither.
+
+    The same drawing gives the same bytes: neither file has a date in it.
 
     Parameters
     ----------
     id : str
         A key of `FIGURES`.
     folder : Path
-        Where its picture is written.
+        Where its files are written.
 
     Returns
     -------
@@ -55,11 +60,15 @@ def make(id, folder):
         Its numbers, as in metrics.json.
     """
     panel = FIGURES[id]
-    with plot.style():
+    with drawing.journal():
         figure, metrics = panel.draw()
         try:
-            with whole_file(folder / panel.picture, kind=PNG) as stream:
-                figure.savefig(stream, format="png", metadata={"Software": None})
+            with together():
+                if panel.printed:
+                    with whole_file(folder / panel.printed, kind=PDF) as stream:
+                        figure.savefig(stream, format="pdf", metadata=UNDATED)
+                with whole_file(folder / panel.picture, kind=PNG) as stream:
+                    figure.savefig(stream, format="png", metadata={"Software": None})
         finally:
             plt.close(figure)
     return as_written(metrics)
@@ -90,8 +99,8 @@ def show(id):
     except ImportError as error:
         print(f"Figure {id} is not drawn here: {error}")
         return {}
-    plt.draw_if_interactive()  # a notebook's first drawing turns it interactive: not in a style that is left again
-    with plot.style():
+    plt.draw_if_interactive()  # begins the notebook's way of showing, which the style's end would undo
+    with drawing.journal():
         _, metrics = FIGURES[id].draw()
     return as_written(metrics)
 

@@ -11,12 +11,12 @@ __all__ = []
 FIRST, TASKS = 540_000, 12
 """Seeds of the tasks: none on which a method was developed."""
 NUMBERS, OBJECTS = (1, 2, 3, 5, 10), 4
-LINES = {  # method: name in metrics.json, what it is, marker
-    "anchored": ("anchored", "ours, told the objects", "o"),
-    "paper": ("paper", "the paper's, told the objects", "D"),
-    "TP-GMM": ("tp_gmm", "TP-GMM, told the objects", "s"),
-    "ProMP": ("promp", "ProMP, told start and goal", "^"),
-    "DMP": ("dmp", "DMP, told start and goal", "v"),
+LINES = {  # method: name in metrics.json, what it is, marker, dashes
+    "anchored": ("anchored", "ours, told the objects", "o", "-"),
+    "paper": ("paper", "the paper's, told the objects", "D", "--"),
+    "TP-GMM": ("tp_gmm", "TP-GMM, told the objects", "s", "-."),
+    "ProMP": ("promp", "ProMP, told start and goal", "^", (0, (5, 1, 1, 1))),
+    "DMP": ("dmp", "DMP, told start and goal", "v", (0, (1, 1))),
 }
 FLOOR = "walked again"
 
@@ -25,7 +25,7 @@ FLOOR = "walked again"
     "x3",
     extra="peers",
     walked_again="the same person again",
-    **{name: words for name, words, _ in LINES.values()},
+    **{name: words for name, words, *_ in LINES.values()},
 )
 def figure_x3():
     """Beyond the paper: tasks among objects that stand somewhere else each time, shown more and more often.
@@ -43,7 +43,7 @@ def figure_x3():
     seeds = range(FIRST, FIRST + TASKS)
     table = peers.summary(peers.study((OBJECTS,), NUMBERS, seeds, methods=methods, jobs=2))
     medians = table.droplevel(["kind", "objects"])
-    figure, ax = plt.subplots(figsize=(7, 4.4))
+    figure, ax = plt.subplots(figsize=(drawing.WIDTH, 3.0))
     for k, method in enumerate(LINES):
         draw_line(ax, method, medians.loc[method], 1.03 ** (k - 2))
     ax.axhline(
@@ -61,15 +61,15 @@ def figure_x3():
     ax.set_xticks(NUMBERS, map(str, NUMBERS))
     ax.set_yticks((1, 2, 5, 10, 20, 40), ("1", "2", "5", "10", "20", "40"))
     ax.minorticks_off()
-    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    drawing.legend_below(figure, ax, columns=2)
     return figure, measured(medians)
 
 
 def draw_line(ax, method, cells, shift):
     """Medians of one method over the number of demonstrations, with their intervals."""
-    _, words, marker = LINES[method]
+    _, words, marker, dashes = LINES[method]
     reach = np.array([cells["median"] - cells.low, cells.high - cells["median"]])
-    look = {"color": drawing.METHODS[method], "marker": marker, "label": words}
+    look = {"color": drawing.METHODS[method], "marker": marker, "label": words, "linestyle": dashes}
     ax.errorbar(cells.index * shift, cells["median"], reach, **look)
 
 

@@ -29,6 +29,8 @@ class Panel:
         What to look at, and what to make of it: the rest of the docstring.
     extra : str
         What must be installed to draw it: a key of `dollop.checks.EXTRAS`.
+    rendered : bool
+        Whether it is nothing but pixels, which a PDF would not make sharper.
     """
 
     id: str
@@ -37,6 +39,7 @@ class Panel:
     caption: str
     look: str
     extra: str
+    rendered: bool = False
 
     @property
     def picture(self):
@@ -44,8 +47,13 @@ class Panel:
         number = self.id.rstrip("ab")
         return f"fig_{number.zfill(2)}{self.id[len(number) :]}.png"
 
+    @property
+    def printed(self):
+        """File name of the PDF beside it, None for what is nothing but pixels."""
+        return None if self.rendered else self.picture.replace(".png", ".pdf")
 
-def panel(id, extra="lab", **columns):
+
+def panel(id, extra="lab", rendered=False, **columns):
     """Register the drawing that follows as a panel.
 
     Parameters
@@ -54,6 +62,8 @@ def panel(id, extra="lab", **columns):
         The paper's name for it.
     extra : str
         What must be installed to draw it.
+    rendered : bool
+        Whether it is nothing but pixels.
     **columns : str
         What its numbers are of, where they are of several things.
 
@@ -66,7 +76,7 @@ def panel(id, extra="lab", **columns):
     def register(draw):
         caption, look = inspect.getdoc(draw).split("\n\n", 1)
         caption, look = (" ".join(each.split()) for each in (caption, look))
-        PANELS[id] = Panel(id, draw, columns, caption, look, extra)
+        PANELS[id] = Panel(id, draw, columns, caption, look, extra, rendered)
         return draw
 
     return register
