@@ -28,21 +28,22 @@ def av():
     return pytest.importorskip("av", reason="films need the extra films")
 
 
-@pytest.fixture
-def recorded(monkeypatch):
-    """The films draw on the recordings in data/, which are those that they would simulate."""
+@pytest.fixture(scope="module")
+def data():
+    """The recordings in data/, which are those that the films would simulate, and what is learned from them."""
     pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
     background = dollop.OccupancyGrid.load(DATA / "lab.yaml")
     eights = SimpleNamespace(recording=lab.Recording.load(DATA / "figure_eights.log.gz"))
     logs = [dollop.read_log(DATA / f"slalom_{k}.log.gz") for k in (0, 1)]
-    shown = [dollop.Demonstration.of(dollop.observe(log, background)) for log in logs]
-    known = {
-        "background_map": lambda: background,
-        "figure_eights": lambda: eights,
-        "slalom_task": lambda: dollop.learn(shown),
-    }
-    monkeypatch.setattr(showing, "recordings", SimpleNamespace(**known))
-    monkeypatch.setattr(merging, "recordings", SimpleNamespace(**known))
+    task = dollop.learn([dollop.Demonstration.of(dollop.observe(log, background)) for log in logs])
+    return SimpleNamespace(background_map=lambda: background, figure_eights=lambda: eights, slalom_task=lambda: task)
+
+
+@pytest.fixture
+def recorded(data, monkeypatch):
+    """The films draw on these recordings."""
+    for module in (showing, merging):
+        monkeypatch.setattr(module, "recordings", data)
 
 
 @pytest.fixture
