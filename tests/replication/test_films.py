@@ -95,6 +95,14 @@ def test_the_loop_is_committed():
     assert sum(shown) / 1000 == pytest.approx(8.0, abs=0.1)
 
 
+def test_the_loop_has_no_seam():
+    """From its last frame to its first no more changes than from frame to frame elsewhere."""
+    with Image.open(FOLDER / "dollop.gif") as picture:
+        frames = [picture.seek(k) or np.asarray(picture.convert("L"), int) for k in range(picture.n_frames)]
+    changed = [np.count_nonzero(np.abs(a - b) > 20) for a, b in zip(frames, frames[1:] + frames[:1], strict=True)]
+    assert changed[-1] <= np.quantile(changed[:-1], 0.95)
+
+
 def test_the_readme_opens_with_the_loop():
     """Right below its title stands the film, and what it shows in words."""
     title, _, first = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()[:3]

@@ -2,6 +2,7 @@
 
 import tempfile
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,9 @@ __all__ = ["encoded", "gif", "mp4", "need_av"]
 QUALITY = "26"
 """Constant rate factor of x264: lower is finer and larger."""
 
-COLOURS = 255
-"""Of an animated GIF: one of 256 is left for what stays as it was in the frame before."""
+SAME, FEW, VIVID = 255, 63, 70
+"""Of the colours of an animated GIF: which stands for what stays as it was in the frame before; how many
+are kept for what is vivid; and what is: the difference of its largest and least of red, green and blue."""
 
 
 def need_av():
@@ -92,10 +94,32 @@ def gif(frames, rate):
     bytes
     """
     frames = list(frames)
-    some = np.concatenate([np.asarray(frame) for frame in frames[:: max(1, len(frames) // 4)]])
-    palette = Image.fromarray(some).quantize(COLOURS, Image.Quantize.MEDIANCUT, dither=0)
-    frames = [frame.quantize(palette=palette, dither=0) for frame in frames]
-    told = {"duration": 10 * round(100 / rate), "loop": 0, "optimize": False, "disposal": 1}
+    palette = palette_of(frames[:: max(1, len(frames) // 4)])
+    shown = [np.asarray(frame.quantize(palette=palette, dither=0)) for frame in frames]
+    new = [shown[0], *(np.where(each == last, SAME, each) for last, each in pairwise(shown))]
+    pictures = [Image.fromarray(each.astype(np.uint8)) for each in new]
+    for each in pictures:
+        each.putpalette(palette.getpalette())
+    told = {"duration": 10 * round(100 / rate), "loop": 0, "transparency": SAME}
     stream = BytesIO()
-    frames[0].save(stream, format="GIF", save_all=True, append_images=frames[1:], **told)
+    look = {"format": "GIF", "save_all": True, "optimize": False, "disposal": 1}
+    pictures[0].save(stream, append_images=pictures[1:], **look, **told)
     return stream.getvalue()
+
+
+def palette_of(frames):
+    """A picture whose palette has the colours of some frames: most for all, the rest for the vivid alone.
+
+    Of a room that is nearly all grey the usual choice would lose the robot's red.
+    """
+    pixels = np.concatenate([np.asarray(frame).reshape(-1, 3) for frame in frames])
+    vivid = pixels[np.ptp(pixels.astype(int), axis=1) > VIVID]
+    colours = np.full((256, 3), 255, np.uint8)
+    for part, begin, end in ((pixels, 0, SAME - FEW), (vivid, SAME - FEW, SAME)):
+        if len(part):
+            found = Image.fromarray(part[None]).quantize(end - begin, Image.Quantize.MEDIANCUT)
+            chosen = np.reshape(found.getpalette(), (-1, 3))[: end - begin]
+            colours[begin : begin + len(chosen)] = chosen
+    picture = Image.new("P", (1, 1))
+    picture.putpalette(colours[:SAME].ravel().tolist())
+    return picture

@@ -20,8 +20,8 @@ __all__ = []
 WIDTH, HEIGHT, TITLE, GAP = 800, 358, 34, 8
 """Pixels of a frame: its size, the height of its titles, and what is between its halves."""
 SHOWN, DONE = "shown once", "done, though a can has moved"
-MOVED = (0.0, 0.0), (-0.35, -1.0)
-"""How far each can is moved in m along x and y: the right one alone."""
+MOVED = (0.85, -0.75), (0.0, 0.0)
+"""How far each can is moved in m along x and y: the left one alone."""
 TAIL = 0.8
 """Share of the way that lies on the floor behind who goes it."""
 STOOD = 1.2
@@ -30,7 +30,7 @@ RING, BARB = 0.24, 0.22
 """m: radius of the ring where the can stood, and length of the two barbs of the arrow."""
 
 
-@film_of("dollop", seconds=8.0, suffix=".gif", rate=50 / 3)
+@film_of("dollop", seconds=8.0, suffix=".gif", rate=20)
 def loop(width, count):
     """A person shows a task once; the robot does it, though a can has moved.
 
@@ -117,7 +117,7 @@ def moved_scene():
 
 def moved_marks():
     """Strips (K, 2, 2) on the floor: a dashed ring where the can stood, and an arrow from there."""
-    start, end = lab.figure_eight_scene().positions[1], moved_scene().positions[1]
+    start, end = lab.figure_eight_scene().positions[0], moved_scene().positions[0]
     along = (end - start) / np.linalg.norm(end - start)
     turn = np.linspace(0, 2 * np.pi, 25)
     ring = start + RING * np.column_stack([np.cos(turn), np.sin(turn)])
