@@ -137,5 +137,8 @@ def second_round():
     (start,) = recordings.starts_near_the_beginning(task, 1, np.random.default_rng(recordings.SEED))
     with lab.World(moved_scene()) as world:
         robot = lab.Pioneer(world, start, background, task.environment, recordings.SEED)
-        dollop.perform(task, robot, background=background)
-        return dollop.perform(task, robot, background=background)
+        for _ in range(2):
+            run = dollop.perform(task, robot, background=background)
+            if not run.finished or run.collisions:
+                raise RuntimeError(f"the robot must do what the loop says that it does, got {run}")
+        return run
