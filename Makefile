@@ -1,6 +1,6 @@
 # make figures   set up .venv from the lock, then regenerate every figure
 # make test      the same set-up, then unit tests, doctests and the notebooks
-.PHONY: help figures test fast coverage fuzz check study universes people worlds bench book data clean
+.PHONY: help figures films test fast coverage fuzz check study universes people worlds bench book data clean
 .DEFAULT_GOAL := help
 
 # The lock is for Python 3.11: the first of these that really is one.
@@ -24,6 +24,9 @@ help:  ## this list
 
 figures: .venv/ready  ## simulate, observe, learn, perform and draw every figure into figures/
 	$(RUN) -m dollop.figures
+
+films: .venv/ready  ## film the laboratory beside the map: every film into films/, two at a time
+	$(RUN) -m dollop.replication.films
 
 # The last notebooks are the longest: begun first, they do not keep the other core waiting.
 test: .venv/ready  ## unit tests, doctests, notebooks

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.image import imsave
+from PIL import Image, ImageChops, ImageDraw
 
 from dollop.checks import checked_number
 from dollop.lab.engine import Engine
@@ -18,8 +19,18 @@ from dollop.lab.rooms import LABORATORY, panel, walls
 from dollop.lab.scenes import figure_eight_scene
 from dollop.pose import rotation
 
-__all__ = ["render_lab", "render_robot"]
+__all__ = ["Studio", "camera", "render_lab", "render_robot"]
 
+VIEW_ANGLE = 50.0
+"""Degrees from top to bottom that a picture of a room takes in."""
+AWAY = (0.0, 0.0, -30.0)
+"""Where nothing is seen."""
+PERSON_REACH, ROBOT_REACH = 1.35, 0.55
+"""Radius in m of a ball round a person, or the robot, and what shadow falls."""
+FILM_ANGLE, LOWER = 45.0, (-0.15, -0.15, -0.2)
+"""A film looks closer than a picture of a room, in degrees, and by so many m beside where that looks."""
+STRIP, FINER = 0.06, 1.1
+"""Width of a strip on the floor in m, and pixels of a part for one of the picture."""
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 CLOTH, JEANS = (0.16, 0.38, 0.55), (0.17, 0.20, 0.30)
 SKIN, HAIR = (0.80, 0.60, 0.47), (0.20, 0.13, 0.08)
@@ -39,7 +50,7 @@ SOFT = 0.12
 """How far round its middle the light reaches where pictures are averaged, by its distance."""
 
 
-class Studio(Engine):
+class Darkroom(Engine):
     """An engine whose pictures can be averaged: edges are smooth then, and shadows soft."""
 
     def photograph(self, eye, target, view_angle, width, height, passes=1):
@@ -118,7 +129,7 @@ def render_robot(width=1200, height=900, passes=1):
     -------
     (height, width, 3) uint8 array
     """
-    with Studio() as studio:
+    with Darkroom() as studio:
         furnish(studio, LABORATORY)
         show_robot(studio, (4.5, 3.2, -2.0))
         return studio.photograph((4.72, 2.02, 0.56), (4.51, 3.2, 0.24), 31.0, width, height, passes)
@@ -146,14 +157,14 @@ def render_lab(scene=None, walkers=(), width=1200, height=900, passes=1):
     scene = scene or figure_eight_scene()
     for name, pixels in (("width", width), ("height", height)):
         checked_number(name, pixels, 1, 10_000)
-    with Studio() as studio:
+    with Darkroom() as studio:
         furnish(studio, scene.room)
         for each in scene.objects:
             show_object(studio, each)
         show_robot(studio, scene.robot.pose)
         for walker in walkers:
             show_person(studio, *walker)
-        return studio.photograph(*viewpoint(scene.room), 50.0, width, height, passes)
+        return studio.photograph(*viewpoint(scene.room), VIEW_ANGLE, width, height, passes)
 
 
 def viewpoint(room):
@@ -376,3 +387,253 @@ def ellipse(radius, half_height, steps=12):
     """Profile of an ellipsoid standing on the floor."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, steps)
     return np.column_stack([radius * np.cos(angle), half_height * (1 + np.sin(angle))])
+
+
+# ---- pictures of a film
+
+
+class Studio(Engine):
+    """A room that stays furnished while a robot or a person moves in it: for the pictures of a film.
+
+    To be used in a `with` statement. What stands is photographed once, finely; of what moves each
+    picture takes a part alone, from the same place, which is laid over the still one where it and
+    the part without differ. All places are those of the room, in m.
+
+    Parameters
+    ----------
+    scene : Scene
+        What stands there.
+    width, height : int
+        Pixels of the pictures.
+    watching : bool
+        Whether the scene's robot stands where it watches; otherwise it is there when it is moved.
+    marks : sequence of ((2,), (2,)) arrays
+        Grey strips that always lie on the floor: begin and end of each.
+    """
+
+    def __init__(self, scene, width, height, watching=False, marks=()):
+        super().__init__()
+        self._shown, self._lying, self._pieces = [], {}, ()
+        self._size, self._centre = (width, height), np.zeros(3)
+        self._eye, self._target = (np.array(place) for place in viewpoint(scene.room))
+        self._target = self._target + LOWER
+        self._camera = camera(self._eye, self._target, FILM_ANGLE, width, height)
+        furnish(self, scene.room)
+        for each in scene.objects:
+            show_object(self, each)
+        for each in marks:
+            self._lay(each, BIN)
+        self._robot = put_pioneer(self, scene.robot.pose if watching else AWAY)
+        self._lift = self.centre_of_mass(self._robot)
+        self._still = self._marked = self._photograph_still()
+
+    def show(self, *what, **look):
+        """Something to look at; the studio remembers the body.
+
+        Parameters
+        ----------
+        *what, **look : object
+            As `Engine.show` has them.
+
+        Returns
+        -------
+        int
+            The body.
+        """
+        body = super().show(*what, **look)
+        self._shown.append(body)
+        return body
+
+    def lay(self, pieces, colour):
+        """Lay out strips on the floor, none of which is in the pictures until it is asked for.
+
+        Parameters
+        ----------
+        pieces : (K, 2, 2) array
+            Begin and end of each.
+        colour : tuple of 3 floats
+            Red, green, blue in 0 to 1.
+        """
+        self._pieces, self._colour = np.asarray(pieces, dtype=float), colour
+        self._strew(range(len(self._pieces)))
+        self._marked = self._photograph_still()
+
+    def empty(self):
+        """A picture of what stands.
+
+        Returns
+        -------
+        PIL.Image.Image
+        """
+        return self._still.copy()
+
+    def pixels(self, places):
+        """Where places on the floor are in a picture.
+
+        Parameters
+        ----------
+        places : (N, 2) array_like
+            In m.
+
+        Returns
+        -------
+        (N, 2) float array
+            Pixels across and down.
+        """
+        across, down, scale = self._camera @ (np.pad(places, ((0, 0), (0, 1))) - self._eye).T
+        return np.column_stack([across / scale, down / scale])
+
+    def person_at(self, position, heading, phase, strips=()):
+        """A picture with a person in it.
+
+        Parameters
+        ----------
+        position : (2,) array
+        heading, phase : float
+            In rad, of the chest and of the gait.
+        strips : sequence of int
+            Which strips lie on the floor.
+
+        Returns
+        -------
+        PIL.Image.Image
+        """
+        self._strew(strips)
+        middle = np.array([*position, 0.0]) + (0.30, 0.38, 0.75)  # of body and shadow
+        without = self._photograph_part(middle, PERSON_REACH)
+        begun = len(self._shown)
+        show_person(self, position - self._centre[:2], heading, phase)
+        part = self._photograph_part(middle, PERSON_REACH)
+        for body in self._shown[begun:]:
+            self.remove(body)
+        return self._laid_over(part, without, middle, PERSON_REACH)
+
+    def robot_at(self, pose, strips=(), lifted=0.0):
+        """A picture with the robot in it.
+
+        Parameters
+        ----------
+        pose : (3,) array
+            x, y in m, theta in rad.
+        strips : sequence of int
+            Which strips lie on the floor.
+        lifted : float
+            How far above the floor, in m: somebody carries it.
+
+        Returns
+        -------
+        PIL.Image.Image
+        """
+        self._strew(strips)
+        x, y, theta = pose
+        reach, middle = ROBOT_REACH + lifted, np.array([x + 0.1, y + 0.1, 0.15 + lifted / 2])
+        self.place(self._robot, AWAY)
+        without = self._photograph_part(middle, reach)
+        ahead, _, up = self._lift
+        place = np.array([x + ahead * np.cos(theta), y + ahead * np.sin(theta), up + lifted])
+        self.place(self._robot, place - self._centre, theta)
+        return self._laid_over(self._photograph_part(middle, reach), without, middle, reach)
+
+    def _strew(self, strips):
+        """Put those strips on the floor, and no others."""
+        for k in self._lying.keys() - set(strips):
+            self.remove(self._lying.pop(k))
+        for k in sorted(set(strips) - self._lying.keys()):
+            self._lying[k] = self._lay(self._pieces[k], self._colour)
+
+    def _lay(self, piece, colour):
+        """A strip on the floor from one place (2,) to another; its body."""
+        start, end = piece - self._centre[:2]
+        (along, aside), middle = end - start, (start + end) / 2
+        size = np.hypot(along, aside) + STRIP / 2, STRIP, 0.012
+        turn = about_vertical(np.arctan2(aside, along))
+        return self.show((*middle, 0.006), colour, size, orientation=turn)
+
+    def _photograph(self, target, angle, width, height):
+        """A picture from where all are taken, wherever the last one has moved everything to."""
+        eye, target = self._eye - self._centre, target - self._centre
+        image = self.photograph(eye, target, angle, width, height)
+        self._centre = self._centre + (*target[:2], 0.0)
+        return Image.fromarray(image)
+
+    def _photograph_still(self):
+        """What stands, finely."""
+        width, height = self._size
+        return self._photograph(self._target, FILM_ANGLE, 2 * width, 2 * height).reduce(2)
+
+    def _photograph_part(self, middle, reach):
+        """What is within so many m of a place (3,), a little finer than the picture."""
+        angle = angle_of(reach, middle - self._eye)
+        fine = FINER * self._size[1] / np.tan(np.radians(FILM_ANGLE) / 2)
+        pixels = int(np.ceil(fine * np.tan(np.radians(angle) / 2)))
+        return self._photograph(middle, angle, pixels, pixels)
+
+    def _laid_over(self, part, without, middle, reach):
+        """The still picture with its strips, and over it a part where it is not as without."""
+        picture = self._still.copy()
+        if self._lying:
+            picture.paste(self._marked, mask=self._mask_of_strips())
+        angle = angle_of(reach, middle - self._eye)
+        to_part = camera(self._eye, middle, angle, *part.size) @ np.linalg.inv(self._camera)
+        corners = [(0, 0, 1), (part.width, 0, 1), (0, part.height, 1), (*part.size, 1)]
+        across, down, scale = np.linalg.inv(to_part) @ np.transpose(corners)
+        ends = np.sort([across / scale, down / scale])[:, [0, -1]]
+        (left, right), (high, low) = np.clip(ends.T, 0, self._size).astype(int).T.tolist()
+        if left == right or high == low:
+            return picture
+        to_part = to_part @ [[1, 0, left], [0, 1, high], [0, 0, 1]]
+        how = {
+            "size": (right - left, low - high),
+            "method": Image.Transform.PERSPECTIVE,
+            "data": (to_part / to_part[2, 2]).ravel()[:8].tolist(),
+            "resample": Image.Resampling.BICUBIC,
+        }
+        changed = ImageChops.difference(part, without).convert("L").point(sharply)
+        picture.paste(part.transform(**how), (left, high), changed.transform(**how))
+        return picture
+
+    def _mask_of_strips(self):
+        """Where the strips that lie there are in the picture, generously."""
+        mask = Image.new("L", self._size)
+        pen = ImageDraw.Draw(mask)
+        for k in self._lying:
+            start, end = self._pieces[k]
+            along = STRIP * (end - start) / np.linalg.norm(end - start)
+            aside, begin = np.array([-along[1], along[0]]), start - along
+            corners = [begin + aside, end + aside, end - aside, begin - aside]
+            pen.polygon(self.pixels(corners).ravel().tolist(), fill=255)
+        return mask
+
+
+def angle_of(radius, away):
+    """The angle in degrees that a ball of a radius in m takes in, so far away (3,) in m."""
+    return np.degrees(2 * np.arcsin(radius / np.linalg.norm(away)))
+
+
+def sharply(change):
+    """How much of a picture is laid over another, 0 to 255, where it is changed by so much."""
+    return min(255, 24 * max(0, change - 2))
+
+
+def camera(eye, target, angle, width, height):
+    """What turns directions into pixels times their depth, as `Engine.photograph` sees them.
+
+    Parameters
+    ----------
+    eye, target : (3,) array
+        In m.
+    angle : float
+        From top to bottom, in degrees.
+    width, height : int
+        Pixels.
+
+    Returns
+    -------
+    (3, 3) array
+    """
+    ahead = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    focus = height / 2 / np.tan(np.radians(angle) / 2)
+    lens = np.array([[focus, 0, width / 2], [0, -focus, height / 2], [0, 0, 1]])
+    return lens @ [right, np.cross(right, ahead), ahead]
