@@ -88,7 +88,8 @@ class Dragged:
         self._later.single_shot = True
         handlers = {"button_press": self._take, "motion_notify": self._move, "button_release": self._drop}
         for name, handler in handlers.items():
-            ax.figure.canvas.mpl_connect(f"{name}_event", handler)
+            # A canvas forgets methods whose object nobody keeps, but not functions.
+            ax.figure.canvas.mpl_connect(f"{name}_event", lambda event, handler=handler: handler(event))
 
     def put(self, places):
         """Put the things somewhere, as if they had been dragged there.

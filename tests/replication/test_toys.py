@@ -1,5 +1,7 @@
 """Toys answer the mouse: what is dragged follows it, what cannot be is said in words, and nothing good is lost."""
 
+import gc
+
 import numpy as np
 import pytest
 from matplotlib.backend_bases import MouseEvent
@@ -77,6 +79,14 @@ def test_a_thing_follows_the_mouse_and_the_others_stay(ax, cans, seen):
     assert_near(seen.drops[-1], [CANS[0], (5.5, 2.5)])
     assert_near(cans.places, seen.drops[-1])
     assert cans.held is None and cans.said == ax.get_title().strip() == "let go"
+
+
+def test_a_toy_that_nobody_keeps_still_works(ax, seen):
+    """The picture keeps it, as long as it is shown."""
+    toys.Dragged(ax, CANS, seen.on_move, seen.on_drop)
+    gc.collect()
+    toys.drag(ax, CANS[1], (6.0, 3.0))
+    assert_near(seen.drops[-1][1], (6.0, 3.0))
 
 
 def test_who_presses_beside_everything_moves_nothing(ax, cans, seen):
