@@ -1,8 +1,8 @@
 """Pictures that answer the mouse: things that are dragged, clicks, and words that say what came of it.
 
-A toy is a figure on a live canvas (`%matplotlib widget`). It works on any other canvas too, where
-`click` and `drag` play the mouse: so a test, or the check at the end of a notebook, tries the same toy
-in a figure of its own, and the one that the reader plays with stays as it is.
+A toy is a figure on a live canvas (`live_figure`). It works on any other canvas too, where `click` and
+`drag` play the mouse: so a test, or the check at the end of a notebook, tries the same toy in a figure
+of its own, and the one that the reader plays with stays as it is.
 """
 
 from textwrap import wrap
@@ -10,6 +10,7 @@ from time import perf_counter
 
 import numpy as np
 from matplotlib.backend_bases import MouseButton, MouseEvent
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from dollop import plot
@@ -17,12 +18,36 @@ from dollop.checks import checked_positions
 from dollop.environment import checked_boxes
 from dollop.gridmap import covered_cells
 
-__all__ = ["Dragged", "Layer", "check_standing", "click", "drag", "tell"]
+__all__ = ["Dragged", "Layer", "check_standing", "click", "drag", "live_figure", "tell"]
 
 LINES = 2
 """So many lines of words over a picture, always: it must not jump when there is more to say."""
 REST = 0.05
 """s for which moves of the mouse are passed over when one has been drawn: those that have queued up meanwhile."""
+
+
+def live_figure(width, height):
+    """A figure that hears the mouse where a notebook shows it: end a cell with its `canvas`.
+
+    Pyplot does not know it: no later cell draws into it by mistake, and pictures stay still elsewhere
+    without `%matplotlib widget` and back.
+
+    Parameters
+    ----------
+    width, height : float
+        In inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    from ipympl.backend_nbagg import Canvas, FigureManager  # of the extra notebooks
+
+    figure = Figure(figsize=(width, height))
+    canvas = Canvas(figure)
+    FigureManager(canvas, 0)
+    canvas.header_visible = canvas.toolbar_visible = False
+    return figure
 
 
 class Dragged:

@@ -2,6 +2,7 @@
 
 import gc
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.backend_bases import MouseEvent
@@ -190,3 +191,16 @@ def test_a_click_is_where_it_was_made(ax):
     ax.figure.canvas.mpl_connect("button_press_event", lambda event: found.append((event.xdata, event.ydata)))
     toys.click(ax, (3.0, 4.0))
     assert_near(found, [(3.0, 4.0)])
+
+
+def test_a_live_figure_is_none_of_pyplots():
+    """What is drawn by pyplot afterwards is drawn elsewhere, and the mouse is heard."""
+    pytest.importorskip("ipympl", reason="live figures need the extra notebooks")
+    live = toys.live_figure(8, 5)
+    ax = live.subplots()
+    ax.set(xlim=(0, 9), ylim=(0, 7))
+    cans = toys.Dragged(ax, CANS, lambda places: None)
+    assert plt.gca() is not ax
+    toys.drag(ax, CANS[0], (3.0, 3.0))
+    assert_near(cans.places[0], (3.0, 3.0))
+    plt.close("all")
