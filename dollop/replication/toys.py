@@ -1,8 +1,8 @@
-"""Pictures that answer the mouse: things that are dragged, clicks, and words that say what came of it.
+"""Pictures that answer the mouse: what is dragged or clicked, and words for what came of it.
 
-A toy is a figure on a live canvas (`live_figure`). It works on any other canvas too, where `click` and
-`drag` play the mouse: so a test, or the check at the end of a notebook, tries the same toy in a figure
-of its own, and the one that the reader plays with stays as it is.
+A toy is a figure on a live canvas (`live_figure`). It works on any other canvas too, where
+`click` and `drag` play the mouse: so a test, or the check at the end of a notebook, tries the
+same toy in a figure of its own, and the one that the reader plays with stays as it is.
 """
 
 from textwrap import wrap
@@ -23,14 +23,14 @@ __all__ = ["Dragged", "Layer", "check_standing", "click", "drag", "live_figure",
 LINES = 2
 """So many lines of words over a picture, always: it must not jump when there is more to say."""
 REST = 0.05
-"""s for which moves of the mouse are passed over when one has been drawn: those that have queued up meanwhile."""
+"""s for which moves of the mouse are passed over when one has been drawn: they have queued up meanwhile."""
 
 
 def live_figure(width, height):
     """A figure that hears the mouse where a notebook shows it: end a cell with its `canvas`.
 
-    Pyplot does not know it: no later cell draws into it by mistake, and pictures stay still elsewhere
-    without `%matplotlib widget` and back.
+    Pyplot does not know it: no later cell draws into it by mistake, and pictures stay still
+    elsewhere without `%matplotlib widget` and back.
 
     Parameters
     ----------
@@ -53,11 +53,12 @@ def live_figure(width, height):
 class Dragged:
     """Things in a picture that the mouse drags, with all that depends on them.
 
-    Press the mouse near the middle of a thing, move it, let go. While it moves, `on_move` is called with
-    the places of all things, and `on_drop` when it is let go. They draw what depends on the places (see
-    `Layer`), and what they return is written over the picture. Where they raise a ValueError its words are
-    written there; the last good picture stays, and a thing that is let go there goes back to where it was
-    taken from. Of moves that come faster than they can be drawn the newest is drawn.
+    Press the mouse near the middle of a thing, move it, let go. While it moves, `on_move` is
+    called with the places of all things, and `on_drop` when it is let go. They draw what depends
+    on the places (see `Layer`), and what they return is written over the picture. Where they
+    raise a ValueError its words are written there; the last good picture stays, and a thing that
+    is let go there goes back to where it was taken from. Of moves that come faster than they can
+    be drawn the newest is drawn.
 
     Parameters
     ----------
@@ -65,10 +66,10 @@ class Dragged:
     places : (N, 2) array_like
         Of the things' middles, in m.
     on_move : callable
-        Takes places (N, 2), returns words or None; called at once, with the places as they are. It must
-        raise before it draws.
+        Takes places (N, 2), returns words or None. It must raise before it draws.
     on_drop : callable, optional
-        The same for what takes too long to be done at every move; `on_move` by default.
+        The same for what takes too long to be done at every move; `on_move` by default. It is
+        called at once, with the places as they are.
     reach : float
         How near to its middle a thing is taken hold of, in m.
     clock : callable
@@ -105,16 +106,15 @@ class Dragged:
         self.places = checked_positions("places", places, "N", 2)
         self.on_move, self.on_drop = on_move, on_drop or on_move
         self.held, self.said, self._from, self._newest, self._resting = None, "", None, None, 0.0
-        look = {"color": plot.OBSTACLE, "markersize": 14, "alpha": 0.3, "zorder": 8}
+        look = {"color": plot.OBSTACLE, "marker": "o", "markersize": 14, "alpha": 0.3, "zorder": 8}
         # Not by Axes.plot: what can be seen of the plane is not for a handle to change.
-        self._grips = ax.add_artist(Line2D(*self.places.T, marker="o", linestyle="none", label="to drag", **look))
+        self._grips = ax.add_artist(Line2D(*self.places.T, linestyle="none", label="to drag", **look))
         self._call(self.on_drop, self.places)
         self._later = ax.figure.canvas.new_timer(1000 * REST, [(self._catch_up, (), {})])
         self._later.single_shot = True
-        handlers = {"button_press": self._take, "motion_notify": self._move, "button_release": self._drop}
-        for name, handler in handlers.items():
-            # A canvas forgets methods whose object nobody keeps, but not functions.
-            ax.figure.canvas.mpl_connect(f"{name}_event", lambda event, handler=handler: handler(event))
+        self._hear("button_press_event", self._take)
+        self._hear("motion_notify_event", self._move)
+        self._hear("button_release_event", self._drop)
 
     def put(self, places):
         """Put the things somewhere, as if they had been dragged there.
@@ -131,17 +131,22 @@ class Dragged:
         """
         return self._call(self.on_drop, checked_positions("places", places, "N", 2))
 
+    def _hear(self, name, handler):
+        """Have an event handled; a canvas forgets methods of what nobody keeps, but no functions."""
+        self.ax.figure.canvas.mpl_connect(name, lambda event: handler(event))
+
     def _take(self, event):
         """Take hold of the thing that is nearest to the mouse, if there is one within reach."""
         if event.button == MouseButton.LEFT and event.inaxes is self.ax and len(self.places):
             away = np.linalg.norm(self.places - self._place(event), axis=1)
             if away.min() <= self.reach:
                 self.held, self._from = int(away.argmin()), self.places
+                self.ax.figure.set_layout_engine("none")  # no axes must move under the mouse
 
     def _move(self, event):
         if self.held is None:
             return
-        if event.buttons is not None and not event.buttons:  # let go where nobody told us: beyond the picture
+        if event.buttons is not None and not event.buttons:  # let go beyond the picture
             self._drop(event)
             return
         self._newest = event
@@ -196,8 +201,8 @@ class Dragged:
 class Layer:
     """The part of a picture that is drawn anew at every move, over what stays.
 
-    Whatever is drawn into the axes inside a `with` block takes the place of what was drawn in the one
-    before.
+    Whatever is drawn into the axes inside a `with` block takes the place of what was drawn in the
+    one before.
 
     Parameters
     ----------
@@ -242,7 +247,8 @@ def tell(ax, words, wrong=False):
     title = ax.title
     across = ax.get_window_extent().width / ax.figure.dpi * 72 / (0.52 * title.get_fontsize())
     lines = wrap(words, max(int(across), 20), max_lines=LINES, placeholder=" …")
-    title.set(text="\n".join([*lines, *[" "] * (LINES - len(lines))]), color=plot.OBSTACLE if wrong else "black")
+    lines += [" "] * (LINES - len(lines))
+    title.set(text="\n".join(lines), color=plot.OBSTACLE if wrong else "black")
     ax.figure.canvas.draw_idle()
 
 
@@ -261,10 +267,10 @@ def check_standing(boxes, background):
     ValueError
         Words for whoever put it there.
     """
-    boxes = checked_boxes(boxes)
+    boxes, shape = checked_boxes(boxes), background.occupancy.shape
     for k, box in enumerate(boxes):
         place = "({:.1f}, {:.1f})".format(*box.reshape(2, 2).mean(axis=0))
-        cells = covered_cells(box[None], background.origin, background.resolution, background.occupancy.shape)
+        cells = covered_cells(box[None], background.origin, background.resolution, shape)
         if background.occupied[cells].any():
             raise ValueError(f"at {place} it would stand in a wall or in furniture")
         if not cells.any() or background.free[cells].mean() < 0.5:
