@@ -133,10 +133,12 @@ def by_short_name(app, env, node, contnode):
     if node.get("refdomain") != "py":
         return None
     objects = env.domains.python_domain.objects
-    target = node["reftarget"].removeprefix("dollop.")
-    parts = target.split(".")
-    ways = (called(".".join(parts[n:]), objects) for n in range(len(parts)))
-    if len(found := next(filter(None, ways), [])) == 1:
+    if not CALLED:
+        CALLED.update(by_endings(objects))
+    parts = node["reftarget"].removeprefix("dollop.").split(".")
+    endings = (".".join(parts[n:]) for n in range(len(parts)))
+    found = next((CALLED[ending] for ending in endings if ending in CALLED), [])
+    if len(found) == 1:
         to = objects[found[0]]
         return make_refnode(app.builder, node["refdoc"], to.docname, to.node_id, contnode, found[0])
     if node["reftarget"].startswith("dollop."):
@@ -144,11 +146,20 @@ def by_short_name(app, env, node, contnode):
     return None
 
 
-def called(short, objects):
-    """Full names of the objects that are called so; what belongs to a class only with its class."""
-    kinds = SHORT | MEMBERS if "." in short else SHORT
-    names = [name for name, to in objects.items() if to.objtype in kinds]
-    return [name for name in names if name.endswith(f".{short}")]
+CALLED = {}
+"""Full names by what they end in, once all pages are read."""
+
+
+def by_endings(objects):
+    """Full names of the objects, by every ending; what belongs to a class only with its class."""
+    called = {}
+    for name, to in objects.items():
+        parts = name.split(".")
+        first = 1 if to.objtype in SHORT else 2
+        if to.objtype in SHORT | MEMBERS:
+            for length in range(first, len(parts)):
+                called.setdefault(".".join(parts[-length:]), []).append(name)
+    return called
 
 
 def setup(app):

@@ -4,6 +4,7 @@ import base64
 import io
 import re
 import runpy
+import shutil
 from types import SimpleNamespace
 
 import pytest
@@ -310,6 +311,23 @@ def opened(picture):
 # ---- a small book
 
 
+WIDE = f"""
+| {" | ".join(f"column{n}" for n in range(9))} |
+|{"---|" * 9}
+| {" | ".join("`unbreakable_name`" for n in range(9))} |
+
+    {"a very long command " * 9}
+
+$$ {" + ".join(f"x_{{{n}}}" for n in range(60))} $$
+
+<div id="buttons"></div>
+
+    https://mybinder.org/v2/gh/OWNER/NAME/HEAD?urlpath=lab/tree/notebooks
+
+    https://colab.research.google.com/github/OWNER/NAME/blob/main/notebooks/00_overview.ipynb
+"""
+
+
 @pytest.fixture(scope="module")
 def laid_out(tmp_path_factory):
     """The pages of a book of one notebook, laid out as the book is."""
@@ -317,6 +335,7 @@ def laid_out(tmp_path_factory):
     cells = [
         *(markdown("# One\n\nDraw."), code(PICTURE), markdown(READING.replace("[where](a.md)", "where"))),
         *(markdown("**Exercise.** Draw it again."), code({"text/plain": "the answer"}, tags=["hide-cell"])),
+        *(markdown(WIDE), code({"text/html": f"<table class=dataframe><tr>{'<td>1,234.5</td>' * 30}</tr></table>"})),
     ]
     language = {"name": "python", "pygments_lexer": "ipython3"}
     notebook = nbformat.v4.new_notebook(cells=cells, metadata={"language_info": language})
@@ -360,3 +379,67 @@ def test_the_buttons_know_whose_book_it_is_and_nothing_that_is_not_so(laid_out):
     text = (laid_out / "one.html").read_text(encoding="utf-8")
     assert re.search(r'<script data-repository="[^"]*" src="_static/buttons.js', text)
     assert 'os.environ.get("GITHUB_REPOSITORY", "")' in (ROOT / "book" / "conf.py").read_text(encoding="utf-8")
+
+
+# ---- in a browser
+
+
+@pytest.fixture(scope="module")
+def page(laid_out):
+    """The notebook's page in Chromium, as wide as a phone."""
+    driver = pytest.importorskip("selenium.webdriver", reason='opening pages needs the extra "dev"')
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if not (chromium and shutil.which("chromedriver")):
+        pytest.skip("opening pages needs Chromium and its driver: 'apt install chromium chromium-driver'")
+    options = driver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu"):
+        options.add_argument(argument)
+    browser = driver.Chrome(options, driver.ChromeService(shutil.which("chromedriver")))
+    size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    browser.get((laid_out / "one.html").as_uri())
+    yield browser
+    browser.quit()
+
+
+def test_on_a_phone_nothing_is_wider_than_the_page(page):
+    """Wide tables, code and formulas scroll in their own boxes."""
+    wide = "return [...document.querySelectorAll(arguments[0])].filter(e => e.scrollWidth > e.clientWidth + 1).length"
+    assert page.execute_script("return document.documentElement.scrollWidth") == 390
+    assert page.execute_script(wide, ".table-wrapper, pre, div.math, .cell_output") >= 4
+
+
+def test_a_solution_is_folded_on_the_screen_and_unfolded_on_paper(page):
+    """On paper whatever was opened before, and without the navigation."""
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    heights = "return [...document.querySelectorAll('details.hide pre, .mobile-header')].map(e => e.offsetHeight)"
+    header, *solution = page.execute_script(heights)
+    shown = page.execute_script(
+        "return document.querySelector('details.hide pre').checkVisibility({contentVisibilityAuto: true})"
+    )
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert header == 0 and min(solution) > 0 and shown
+    assert not page.execute_script("return document.querySelector('details.hide').open")
+
+
+def test_a_button_leads_to_the_copy_that_somebody_names(page):
+    """By owner and name or by its address; anything else is no copy, and the buttons lead nowhere."""
+    addresses = """
+        const field = document.querySelector("#buttons input");
+        field.value = arguments[0];
+        field.dispatchEvent(new Event("input"));
+        return [...document.querySelectorAll("a.button")].map(each => each.getAttribute("href"));"""
+    told = [
+        "https://mybinder.org/v2/gh/me/a.fork/HEAD?urlpath=lab/tree/notebooks",
+        "https://colab.research.google.com/github/me/a.fork/blob/main/notebooks/00_overview.ipynb",
+    ]
+    for name in (
+        "me/a.fork",
+        " https://github.com/me/a.fork ",
+        "https://github.com/me/a.fork.git",
+        "github.com/me/a.fork/",
+    ):
+        assert page.execute_script(addresses, name) == told
+    for name in ("", "me", "https://example.org/me/a.fork", "me/a fork", "javascript:alert(1)"):
+        assert page.execute_script(addresses, name) == [None, None]

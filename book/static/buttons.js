@@ -15,7 +15,7 @@ function nameOf(text) {  // owner/name, of that or of an address
 document.addEventListener("DOMContentLoaded", () => {
   const place = document.getElementById("buttons");
   if (!place) return;
-  const lines = [...document.querySelectorAll("pre")].map((each) => each.textContent.trim());
+  const lines = [...document.querySelectorAll("pre")].flatMap((each) => each.textContent.split("\n"));
   const addresses = lines.filter((line) => /^https:\S+OWNER\/NAME\S*$/.test(line));
   const field = document.createElement("input");
   field.value = REPOSITORY;
