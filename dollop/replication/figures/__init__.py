@@ -95,7 +95,7 @@ def show(id):
     return as_written(metrics)
 
 
-def differences(id, numbers, folder, within=0.02):
+def differences(id, numbers, folder, within=0.05):
     """Where the numbers of a panel are not those of metrics.json.
 
     Parameters
@@ -107,7 +107,8 @@ def differences(id, numbers, folder, within=0.02):
     folder : str or Path
         Of metrics.json.
     within : float
-        Relative difference that another processor may make.
+        Relative difference that another processor may make: 3 % in the spread of Fig. 12a, where readings
+        of the laser were rounded otherwise.
 
     Returns
     -------
