@@ -190,7 +190,7 @@ def plain(text):
     text = re.sub(r"(?m)^(#+ |\|).*$", " ", text)
     text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
     text = re.sub(r"\{[\w:]+\}`([^`<]*?)\s*(<[^`]*>)?`", r"\1", text)
-    text = re.sub(r"\\\w+(?=\{)|\\(?=\w)|[*`$\\{}]|(?m:^> )", "", text)
+    text = re.sub(r"\\\w+(?=\{)|\\(?=\w)|[*`$\\{}]|(?m:^(?:> |- |\d+\. ))", "", text)
     return " ".join(text.split())
 
 
