@@ -15,10 +15,11 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import nbformat
 from executed import execute, make_readable
-from faults import faults, size
+from faults import Page, faults, size
 from sphinx.cmd.build import main as sphinx
 from tqdm import tqdm
 
@@ -76,7 +77,7 @@ def lay_out():
     options = ["-q", "-W", "--keep-going", "-j", "auto", "-c", str(ROOT / "book")]
     if failed := sphinx([*options, "-d", str(SOURCE / ".doctrees"), str(SOURCE), str(OUT)]):
         return failed
-    copy_films(ROOT / "films", OUT / "films")
+    bring_films(OUT)
     found = list(faults(OUT, LARGEST))
     for fault in found:
         print(fault, file=sys.stderr)
@@ -85,12 +86,16 @@ def lay_out():
     return len(found) > 0
 
 
-def copy_films(folder, to):
-    """The films, where pages look for them: an HTML tag's address is no link that Sphinx would follow."""
-    for path in sorted(folder.glob("*")):
-        if path.suffix in FILMS:
-            to.mkdir(exist_ok=True)
-            shutil.copy(path, to / path.name)
+def bring_films(folder, project=ROOT):
+    """Copy the films and pictures that tags of HTML ask for: Sphinx follows links of Markdown alone."""
+    for path in sorted(folder.rglob("*.html")):
+        for link in Page(path).links:
+            wanted = Path(os.path.normpath(path.parent / unquote(urlsplit(link).path)))
+            if wanted.suffix in FILMS and wanted.is_relative_to(folder) and not wanted.exists():
+                original = project / wanted.relative_to(folder)
+                if original.is_file():
+                    wanted.parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copy(original, wanted)
 
 
 def gather():

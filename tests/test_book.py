@@ -211,15 +211,18 @@ def test_a_book_that_is_too_large_is_told_with_what_makes_it_so(small_book):
     assert found(small_book, largest=3) == [] and build.LARGEST == 40
 
 
-def test_films_are_copied_to_where_pages_look_for_them(tmp_path):
-    """Films and pictures, and nothing else; without films there is nothing to do."""
-    build.copy_films(tmp_path / "films", tmp_path / "to")
-    assert not (tmp_path / "to").exists()
-    (tmp_path / "films").mkdir()
-    for name in ("a.mp4", "loop.webp", "README.md"):
-        (tmp_path / "films" / name).touch()
-    build.copy_films(tmp_path / "films", tmp_path / "to")
-    assert {path.name for path in (tmp_path / "to").iterdir()} == {"a.mp4", "loop.webp"}
+def test_films_that_a_page_asks_for_are_brought_and_no_others(small_book, tmp_path):
+    """From where the page would have them in the project; what is not there stays a dead link."""
+    project = tmp_path / "project"
+    (project / "films").mkdir(parents=True)
+    for name in ("a.mp4", "b.mp4", "loop.webp", "notes.txt"):
+        (project / "films" / name).touch()
+    names = ("films/a.mp4", "films/loop.webp", "films/gone.mp4", "films/notes.txt", "https://b.org/films/b.mp4")
+    tags = (f'<video aria-label="a film" src="{name}"></video>' for name in names)
+    (small_book / "films.html").write_text("".join(tags))
+    build.bring_films(small_book, project)
+    assert {path.name for path in (small_book / "films").iterdir()} == {"a.mp4", "loop.webp"}
+    assert found(small_book) == ["dead link: films.html: films/gone.mp4", "dead link: films.html: films/notes.txt"]
 
 
 def test_the_source_of_a_module_becomes_its_page():
