@@ -96,8 +96,9 @@ def still(states, buffers, root):
     values = [buffers[part]["value",] for part in parts if ("value",) in buffers.get(part, {})]
     sources = (f"data:image/png;base64,{lighter(value['data'])}" for value in values)
     images = "".join(f'<img src="{source}">' for source in sources)
+    words = "controls move this" if images else "controls stand here"
     here = f" Here: {settings}." if settings else ""
-    return f'<p class="still">In the live notebook, controls move this.{here}</p>{images}'
+    return f'<p class="still">In the live notebook, {words}.{here}</p>{images}'
 
 
 def descendants(states, name):

@@ -49,6 +49,7 @@ def test_a_widget_becomes_a_picture_with_its_settings():
     still = executed.still(STATES, BUFFERS, "box")
     assert "Here: x &lt; y = 20 mm." in still
     assert f'src="data:image/png;base64,{executed.lighter(png())}"' in still
+    assert "controls stand here." in executed.still({"row": {}}, {}, "row")
 
 
 def test_a_figure_that_can_be_clicked_into_is_its_own_still():
