@@ -419,11 +419,13 @@ def test_a_solution_is_folded_on_the_screen_and_unfolded_on_paper(page):
     page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     heights = "return [...document.querySelectorAll('details.hide pre, .mobile-header')].map(e => e.offsetHeight)"
     header, *solution = page.execute_script(heights)
-    shown = page.execute_script(
-        "return document.querySelector('details.hide pre').checkVisibility({contentVisibilityAuto: true})"
-    )
+    seen = """
+        const code = document.querySelector("details.hide pre");
+        const { animationName, opacity } = getComputedStyle(document.querySelector("details.hide > :not(summary)"));
+        return [code.checkVisibility({ contentVisibilityAuto: true }), animationName, opacity];"""
+    as_printed = page.execute_script(seen)
     page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
-    assert header == 0 and min(solution) > 0 and shown
+    assert header == 0 and min(solution) > 0 and as_printed == [True, "none", "1"]
     assert not page.execute_script("return document.querySelector('details.hide').open")
 
 
