@@ -42,8 +42,9 @@ def picture(image):
     """
     height, width = image.shape[:2]
     dpi = STYLE["savefig.dpi"]
-    figure = plt.figure(figsize=(width / dpi, height / dpi), layout="none")
+    figure = plt.figure(figsize=(width / dpi, height / dpi), dpi=dpi, layout="none")
     figure.figimage(image, resize=False)
+    figure.add_axes((0, 0, 1, 1)).set_axis_off()  # a notebook takes what has no axes for empty
     return figure
 
 

@@ -37,7 +37,7 @@ standard deviation over the seeds. What differs between processors is far below 
 (numpy without AVX and another kernel of the linear algebra left all six digits of the table as they
 were); a walk drawn anew is far above it, for fewer than one in a hundred would come that near by
 chance. But a reading of the laser that lies between two millimetres may be rounded otherwise, and a
-cut that is as good at two places then moves: on a processor without AVX-512, five of the numbers did
+cut that is as good at two places then moves: on a second processor five of the 300 numbers did
 so, by a fifth of a standard deviation at most.
 """
 

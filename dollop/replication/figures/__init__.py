@@ -90,6 +90,7 @@ def show(id):
     except ImportError as error:
         print(f"Figure {id} is not drawn here: {error}")
         return {}
+    plt.draw_if_interactive()  # a notebook's first drawing turns it interactive: not in a style that is left again
     with plot.style():
         _, metrics = FIGURES[id].draw()
     return as_written(metrics)

@@ -1,1 +1,1 @@
-"""Teaching in the laboratory: somebody draws a walk, the robot watches it, learns it, and drives it."""
+"""Teaching in the laboratory: somebody draws a walk; the robot watches, learns and drives it."""

@@ -2,7 +2,8 @@
 
 Everything is done with the mouse. Where a line is drawn on the floor, the person walks; an object
 that is dragged is moved; a click carries the robot off. What the robot makes of it is drawn as it
-goes, and said in words over the plan; what cannot be is said where it was tried, and changes nothing.
+goes, and said in words over the plan; what cannot be is said where it was tried, and changes
+nothing.
 """
 
 import asyncio
@@ -16,16 +17,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from dollop import plot
-from dollop.replication.teaching.lesson import Lesson, Refused, driving, has_laboratory, seen_points, walking
+from dollop.replication.teaching import lesson as lessons
+from dollop.replication.teaching.lesson import Lesson, Refused
 
 __all__ = ["Classroom"]
 
 GRASP = 0.15
 """m that a mouse moves before a click becomes a line."""
 FRAMES, PERIODS = 45, 8
-"""Pictures of a walk, about, and the robot's periods from one picture to the next: more would only take longer."""
+"""Pictures of a walk, about, and the robot's periods between two: more would only take longer."""
 SIZE, PLAN, KNOWN = (10, 5.8), (0.05, 0.15, 0.64, 0.77), (0.69, 0.15, 0.3, 0.77)
-"""Inches of the figure, and where in it the plan is and what the robot knows: neither moves under the mouse."""
+"""Inches of the figure, and where the plan is and what the robot knows: they stay under the mouse."""
 PAUSE = 0.02
 """s between two pictures, in which the mouse is heard."""
 WARNING = "#B0003A"
@@ -61,16 +63,17 @@ class Classroom:
     def __init__(self, background, scene=None, live=True):
         self._first = scene
         self.live, self.tool, self.run, self.said = live, "", None, INVITATION
-        self._hearers, self._going, self._drawn, self._held, self._pressed = [], None, None, None, None
-        self._trail = self._carry = None
+        self._hearers, self._going, self._trail, self._carry = [], None, None, None
+        self._drawn = self._held = None
         self.lesson = Lesson.begin(background, scene)
         self.figure = Figure(figsize=SIZE)
         self._plan, self._known = (self.figure.add_axes(each) for each in (PLAN, KNOWN))
         self._plan.set_anchor("NW")
-        # What is not opaque is sent whole. Else only changes are, of which a browser that is late loses some.
+        # What is not opaque is sent whole; of changes a browser that is late would lose some.
         self.figure.patch.set_alpha(0.99)
         self._still = None
-        canvas = canvas_that_is_heard(self.figure) if live and running_loop() else FigureCanvasAgg(self.figure)
+        make = canvas_that_is_heard if live and running_loop() else FigureCanvasAgg
+        canvas = make(self.figure)
         for event, heard in (
             ("button_press_event", self._press),
             ("motion_notify_event", self._move),
@@ -107,7 +110,8 @@ class Classroom:
         import ipywidgets
 
         said = ipywidgets.HTML()
-        buttons = [ipywidgets.Button(description=each) for each in (*TOOLS, "drive again", "start over")]
+        names = *TOOLS, "drive again", "start over"
+        buttons = [ipywidgets.Button(description=each) for each in names]
         for button in buttons:
             button.on_click(lambda pressed: self._pressed_button(pressed.description))
 
@@ -193,7 +197,7 @@ class Classroom:
         """
         if self.lesson.task is None:
             self._say("There is nothing to drive yet. " + INVITATION)
-        elif self.lesson.scene.room.distance([place])[0] < 0.35 or self.lesson.nearest(place, 0.65) is not None:
+        elif not self.lesson.has_room(place):
             self._refuse(Refused("no room for the robot", place))
         elif self.busy and self._carry is None and self._trail is not None:
             self._carry = place
@@ -210,7 +214,8 @@ class Classroom:
     def start_over(self):
         """Forget everything; the objects stand as in the beginning."""
         self._stop()
-        self.lesson, self.run, self.tool = Lesson.begin(self.lesson.background, self._first), None, ""
+        self.lesson = Lesson.begin(self.lesson.background, self._first)
+        self.run, self.tool = None, ""
         self.said = INVITATION
         self._draw()
 
@@ -265,9 +270,10 @@ class Classroom:
         """The person walks, the robot learns; then it drives."""
         self.run, first = None, len(self.lesson.demonstrations) == 0
         self._say("The person walks; the robot watches.")
-        walk, fan, person = self._moving("USER"), self._moving("ray"), self._figure_of("person", 0.25, plot.TRUTH)
+        walk, fan = self._moving("USER"), self._moving("ray")
+        person = self._figure_of("person", 0.25, plot.TRUTH)
         trail = []
-        steps = walking(self.lesson, shown, len(self.lesson.demonstrations))
+        steps = lessons.walking(self.lesson, shown, len(self.lesson.demonstrations))
         while True:
             try:
                 sight = next(steps)
@@ -275,7 +281,7 @@ class Classroom:
                 observed = end.value
                 break
             person.center = sight.person
-            points = seen_points(sight)
+            points = lessons.seen_points(sight)
             trail += near(points, sight.person) if len(points) else [sight.person]
             walk.set_data(*np.transpose(trail or [(np.nan, np.nan)]))
             fan.set_data(*rays(self.lesson.scene.robot.laser_pose, points))
@@ -285,10 +291,12 @@ class Classroom:
         try:
             self.lesson = self.lesson.shown(observed)
         except ValueError as error:
-            self._refuse(Refused(f"the robot could not learn from that: {error}", shown.positions[0]))
+            words = f"the robot could not learn from that: {error}"
+            self._refuse(Refused(words, shown.positions[0]))
             return
         count = len(self.lesson.task.law.subgoals)
-        words = f"{count} subgoals from {'one walk' if first else f'{len(self.lesson.demonstrations)} walks'}. "
+        walks = "one walk" if first else f"{len(self.lesson.demonstrations)} walks"
+        words = f"{count} subgoals from {walks}. "
         yield from self._driven(words=words)
 
     def _driven(self, place=None, words=""):
@@ -297,7 +305,7 @@ class Classroom:
         self._say(f"{words}The robot drives. Click, and it is kidnapped.")
         self._trail = trail = [[]]
         path, robot = self._moving("RUN"), self._figure_of("robot", 0.25, plot.ROBOT)
-        steps, sent, n = driving(self.lesson, len(self.lesson.demonstrations), place), None, 0
+        steps, sent, n = lessons.driving(self.lesson, len(self.lesson.demonstrations), place), None, 0
         while True:
             try:
                 controller, body = steps.send(sent)
@@ -327,7 +335,7 @@ class Classroom:
     def _press(self, event):
         if event.inaxes is not self._plan or event.button != 1:
             return
-        place = self._pressed = np.array([event.xdata, event.ydata])
+        place = np.array([event.xdata, event.ydata])
         self._drawn, self._held = [place], None
         if not self.tool:
             self._held = self.lesson.nearest(place)
@@ -404,11 +412,7 @@ class Classroom:
             for k, walk in enumerate(walks_among(lesson)):
                 plot.path(plan, walk, None if k else "walk, as seen", linewidth=0.8, alpha=0.6)
             if lesson.task:
-                plot.law(plan, lesson.task.law.response(), "control law")
-                plot.subgoals(plan, lesson.task.law.subgoals)
-                for k, place in enumerate(lesson.task.law.subgoals, 1):
-                    plan.annotate(str(k), place, (6, 6), textcoords="offset points", path_effects=[plot.HALO], zorder=8)
-                plan.plot(*lesson.task.law.start, "o", color=plot.LAW, markersize=7, label="start", zorder=6)
+                draw_law(plan, lesson.task.law)
             if self.run:
                 plot.runs(plan, [self.run])
             if refused is not None:
@@ -416,7 +420,8 @@ class Classroom:
             colour = "black" if refused is None else WARNING
             plan.set_title(shortened(self.said, 86), loc="left", fontsize=9, color=colour)
             handles, labels = plan.get_legend_handles_labels()
-            plan.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=5, fontsize=8)
+            below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.09), "ncols": 5}
+            plan.legend(handles, labels, fontsize=8, **below)
             self._moved = {}
             draw_knowledge(self._known, lesson)
         self.figure.canvas.draw()
@@ -457,12 +462,13 @@ class Classroom:
 
 
 def canvas_that_is_heard(figure):
-    """A canvas that a notebook shows, and that hears the mouse; without what would take the mouse for itself."""
+    """A canvas that a notebook shows, and that hears the mouse, for which nothing else asks."""
     from ipympl.backend_nbagg import Canvas, FigureManager
 
     canvas = Canvas(figure)
     FigureManager(canvas, 0)
-    canvas.header_visible = canvas.toolbar_visible = canvas.footer_visible = canvas.resizable = False
+    canvas.header_visible = canvas.footer_visible = False
+    canvas.toolbar_visible = canvas.resizable = False
     return canvas
 
 
@@ -495,9 +501,10 @@ def broken(parts):
 def outcome(run):
     """In a sentence what came of a run."""
     carried = " although it was kidnapped" if len(run.kidnapped) else ""
-    touched = "touched nothing" if not run.collisions else f"touched something {run.collisions} times"
+    touched = f"touched something {run.collisions} times" if run.collisions else "touched nothing"
     if run.finished:
-        return f"Finished{carried}: {run.t[-1]:.0f} s, {touched}, {100 * run.clearance.min():.0f} cm to spare at least."
+        spare = f"{100 * run.clearance.min():.0f} cm to spare at least"
+        return f"Finished{carried}: {run.t[-1]:.0f} s, {touched}, {spare}."
     return f"Not finished: {run.reason}; it {touched}."
 
 
@@ -515,15 +522,27 @@ def draw_room(ax, lesson):
     plot.robot(ax, lesson.scene.robot.pose, label="robot that watches")
 
 
+def draw_law(ax, law):
+    """The control law, from its start through its numbered subgoals."""
+    plot.law(ax, law.response(), "control law")
+    plot.subgoals(ax, law.subgoals)
+    for k, place in enumerate(law.subgoals, 1):
+        look = {"textcoords": "offset points", "path_effects": [plot.HALO], "zorder": 8}
+        ax.annotate(str(k), place, (6, 6), **look)
+    ax.plot(*law.start, "o", color=plot.LAW, markersize=7, label="start", zorder=6)
+
+
 def draw_knowledge(ax, lesson):
     """What the robot knows, in words; and how well it foretold each walk."""
     ax.clear()
-    words = [counted(len(lesson.seen), "object") + " seen", counted(len(lesson.demonstrations), "walk") + " seen"]
-    if not has_laboratory():
+    objects, walks = len(lesson.seen), len(lesson.demonstrations)
+    words = [f"{counted(objects, 'object')} seen", f"{counted(walks, 'walk')} seen"]
+    if not lessons.has_laboratory():
         words.append("PyBullet is missing: no laser looks,\nand a unicycle drives")
     if lesson.task:
         errors = ", ".join(f"{100 * each:.0f}" for each in lesson.task.errors())
-        words += [f"{counted(len(lesson.task.law.subgoals), 'subgoal')}, {counted(len(lesson.task.ways), 'way')}"]
+        subgoals, ways = len(lesson.task.law.subgoals), len(lesson.task.ways)
+        words += [f"{counted(subgoals, 'subgoal')}, {counted(ways, 'way')}"]
         words += [f"misses each walk by {errors} cm"]
     doubts = [shortened(each) for each in lesson.doubts] or ["nothing in doubt"]
     ax.text(0, 1, "What the robot knows", weight="bold", va="top", transform=ax.transAxes)
@@ -536,7 +555,8 @@ def draw_knowledge(ax, lesson):
 def draw_foretold(ax, foretold):
     """How far each walk was from what the walks before it had foretold."""
     ax.bar(range(2, 2 + len(foretold)), 100 * np.array(foretold), color=plot.USER, width=0.5)
-    ax.set(xlabel="walk", xticks=range(2, 2 + len(foretold)), xlim=(1.4, max(4, len(foretold) + 1) + 0.6))
+    last = len(foretold) + 1
+    ax.set(xlabel="walk", xticks=range(2, last + 1), xlim=(1.4, max(4, last) + 0.6))
     ax.set_title("the next walk foretold wrong by [cm]", fontsize=8)
 
 
@@ -572,4 +592,5 @@ def show_refusal(ax, refused):
     ax.plot(*place, "X", color=WARNING, markersize=12, zorder=9)
     side, at = ("right", -10) if place[0] > (left + right) / 2 else ("left", 10)
     look = {"color": WARNING, "weight": "bold", "path_effects": [plot.HALO], "zorder": 9}
-    ax.annotate(shortened(str(refused), 40), place, (at, 8), textcoords="offset points", ha=side, **look)
+    look |= {"textcoords": "offset points", "ha": side}
+    ax.annotate(shortened(str(refused), 40), place, (at, 8), **look)

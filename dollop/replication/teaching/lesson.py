@@ -25,16 +25,20 @@ from dollop.robot.performing import Unicycle
 from dollop.task import Demonstration, learn
 from dollop.trajectory import arc_length, resample
 
-__all__ = ["KINDS", "Lesson", "Refused", "Sight", "driving", "has_laboratory", "seen_points", "walking"]
+__all__ = [
+    "KINDS", "Lesson", "Refused", "Sight", "driving", "has_laboratory", "seen_points", "walking",
+]  # fmt: skip
 
 SHORTEST = 1.5
 """m: who goes less far has shown nothing."""
 CLOSE = 0.05
 """m between the places of a drawn walk that are looked at: no wall is thinner."""
 VIA = 0.5
-"""m between the via-points that the person of the laboratory passes: what is finer is the hand's trembling."""
+"""m between the via-points that the person passes: what is finer is the hand's trembling."""
 FROM_BACKGROUND = 0.25
 """m between shoulder and background: nearer, the laser takes the person for the wall (Sec. II)."""
+ROBOT = 0.35
+"""m round the middle of the robot that are free where it is put down."""
 MOST = 8
 """Objects in the room."""
 KINDS = {"can": Object.trash_can, "cone": Object.cone}
@@ -71,8 +75,8 @@ def has_laboratory():
 class Lesson:
     """What stands in a room, what was shown in it, and what the robot made of that.
 
-    Where there is no PyBullet, nothing is seen by a laser: the robot is told where objects stand and how
-    the person walked.
+    Where there is no PyBullet, nothing is seen by a laser: the robot is told where objects stand and
+    how the person walked.
 
     Attributes
     ----------
@@ -84,10 +88,10 @@ class Lesson:
     demonstrations : tuple of Demonstration
         The walks shown so far, each among the objects as they stood.
     task : Task or None
-        What was learned from them, among the objects as they are seen now; None before the first walk.
+        What was learned from them, among the objects as they are seen now; None before any walk.
     foretold : tuple of float
-        For each walk after the first, how far the task that was learned from those before it would have
-        been from it, mean distance in m.
+        For each walk after the first, how far the task that was learned from those before it would
+        have been from it, mean distance in m.
     """
 
     background: OccupancyGrid
@@ -137,6 +141,21 @@ class Lesson:
             return None
         away = np.linalg.norm(self.scene.positions - place, axis=1)
         return int(away.argmin()) if away.min() <= within else None
+
+    def has_room(self, place):
+        """Whether the robot can be put down at a place.
+
+        Parameters
+        ----------
+        place : (2,) sequence of float
+            In m.
+
+        Returns
+        -------
+        bool
+        """
+        free = self.scene.room.distance([place])[0] >= ROBOT
+        return bool(free) and self.nearest(place, 2 * ROBOT) is None
 
     # ---- objects
 
@@ -253,8 +272,8 @@ class Lesson:
         Raises
         ------
         Refused
-            A line that leaves the room, leads through or too near to a wall, furniture, an object or the
-            robot, or is too short.
+            A line that leaves the room, leads through or too near to a wall, furniture, an object or
+            the robot, or is too short.
         """
         points = np.asarray(points, dtype=float).reshape(-1, 2)
         length = arc_length(points)[-1] if len(points) > 1 else 0.0
@@ -284,7 +303,9 @@ class Lesson:
         ValueError
             If nobody was seen, or nothing can be learned.
         """
-        new = observation if isinstance(observation, Demonstration) else Demonstration.of(observation)
+        new = observation
+        if not isinstance(new, Demonstration):
+            new = Demonstration.of(observation)
         demonstrations = (*self.demonstrations, new)
         task = learn(demonstrations, new.environment).adapt(self.seen)
         foretold = self.foretold
@@ -362,11 +383,12 @@ def check_way(places, scene):
     x, y = places.T
     outside = (x < left) | (x > right) | (y < low) | (y > high)
     room = scene.room.distance(places)
-    at_robot = np.linalg.norm(places - scene.robot.pose[:2], axis=1) < scene.robot.radius + DEPTH / 2
+    to_robot = np.linalg.norm(places - scene.robot.pose[:2], axis=1)
+    at_robot = to_robot < scene.robot.radius + DEPTH / 2
     rules = [
         (outside, "the walk leaves the room"),
         (room == 0.0, "the walk leads through a wall or furniture"),
-        (room < SHOULDERS / 2 + FROM_BACKGROUND, "too near to a wall or furniture for a person to be seen"),
+        (room < SHOULDERS / 2 + FROM_BACKGROUND, "too near to a wall or furniture to be seen"),
         (at_robot, "the walk leads through the robot"),
     ]
     if scene.objects:
@@ -381,8 +403,8 @@ def check_way(places, scene):
 # ---- what goes on while somebody looks
 
 Sight = namedtuple("Sight", "t person log of")
-"""A moment of a walk: t in s, where the person is (2,) in m, the LaserLog of that one scan (None without a
-laser), and how many moments there are.
+"""A moment of a walk: t in s, where the person is (2,) in m, the LaserLog of that one scan (None
+without a laser), and how many moments there are.
 """
 
 
@@ -425,9 +447,9 @@ def walking(lesson, shown, seed=0):
 
 
 def driving(lesson, seed=0, start=None):
-    """The robot performs the task, period by period; whoever looks may send it a place to be carried to.
+    """The robot performs the task, period by period; whoever looks may have it carried elsewhere.
 
-    It is the simulated Pioneer, which finds itself by its laser; where there is no PyBullet, a unicycle.
+    It is the simulated Pioneer, which finds itself by its laser; without PyBullet a unicycle.
 
     Parameters
     ----------
@@ -458,7 +480,8 @@ def driving(lesson, seed=0, start=None):
     try:
         robot = Unicycle(pose)
         if world:
-            robot = lab.Pioneer(world, pose, background, lesson.seen, seed, knows_start=start is None)
+            told = background, lesson.seen, seed, start is None
+            robot = lab.Pioneer(world, pose, *told)
         controller, carried = Controller(lesson.task, robot, background=background), []
         while not controller.over:
             robot.drive(*controller.step(robot.pose))
