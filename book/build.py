@@ -2,26 +2,24 @@
 
     python book/build.py
 
-A page that warns or a link that leads nowhere fails the build. Nothing is fetched when building or
-reading: formulas become MathML, and what moves only with a running Python becomes the picture that
-it shows first.
+A page that warns, a link that leads nowhere, a picture without words and too many bytes fail the build.
+Nothing is fetched when building or reading: formulas become MathML, films are files of the book.
 """
 
 import ast
-import html
 import inspect
 import os
 import re
 import shutil
 import sys
 from concurrent.futures import ProcessPoolExecutor
-from html.parser import HTMLParser
+from functools import cache
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import nbformat
-from nbclient import NotebookClient
-from nbclient.exceptions import CellExecutionError
+from executed import execute, make_readable
+from faults import Page, faults, size
 from sphinx.cmd.build import main as sphinx
 from tqdm import tqdm
 
@@ -29,16 +27,20 @@ import dollop
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE, OUT = ROOT / "build" / "book-source", ROOT / "build" / "book"
+LARGEST = 40  # MB of the whole book
 PAGES = (
     *("README.md", "REPLICATION.md", "CLAIMS.md", "CHANGELOG.md", "CONTRIBUTING.md"),
-    *("figures/README.md", "data/README.md", "book/own_log.md"),
+    *("figures/README.md", "data/README.md"),
+    *(path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("films/*.md"))),
+    *(f"book/{path.name}" for path in sorted(ROOT.glob("book/*.md")) if path.stem not in ("index", "package")),
 )
 PUBLIC = [name for name in dollop.__all__ if name != "__version__"]
 FILE_LINK = re.compile(r'(?:\]\(|src="|href=")([\w./-]+)(?=[)"# ])')
 CODE_LINK = re.compile(r"\]\((?P<up>(\.\./)*)(?P<path>dollop/[\w/]+)\.py\)")
-NAME = re.compile(r"`dollop\.(?P<name>(?P<first>\w+)[\w.]*)`")
-WIDGET = "application/vnd.jupyter.widget-view+json"
-TIMEOUT = 300  # s for one cell
+NAME = re.compile(r"(?<![`\[])`dollop\.(?P<name>(?P<first>\w+)[\w.]*)`(?![`\]])")
+GLOB = re.compile(r"(?m)^([\w/]+\*)\n")
+"""Pages of the first one's contents that may be missing, as the films are before `make films`."""
+FILMS = (".mp4", ".webm", ".webp", ".gif", ".png", ".jpg")
 WINGS = {
     "": "The method, in the order of the paper",
     "cdhmm": "The CDHMM (Sec. V)",
@@ -55,7 +57,6 @@ ORDER = (  # of the paper: what is not named here comes after, by the alphabet
     *("control", "avoidance", "localization", "performing"),
     *("observing", "learning"),
 )
-QUIET = ["--IPKernelApp.log_level=ERROR"]
 
 
 def main():
@@ -71,17 +72,30 @@ def main():
 
 
 def lay_out():
-    """HTML of the sources; a warning of Sphinx is an error, and so is a dead link."""
+    """HTML of the sources; a warning of Sphinx is an error, and so is what is wrong with a page."""
     shutil.rmtree(OUT, ignore_errors=True)
     options = ["-q", "-W", "--keep-going", "-j", "auto", "-c", str(ROOT / "book")]
     if failed := sphinx([*options, "-d", str(SOURCE / ".doctrees"), str(SOURCE), str(OUT)]):
         return failed
-    dead = list(dead_links(OUT))
-    for link in dead:
-        print(f"dead link: {link}", file=sys.stderr)
-    if not dead:
-        print(f"wrote the book: open {os.path.relpath(OUT)}/index.html")
-    return len(dead) > 0
+    bring_films(OUT)
+    found = list(faults(OUT, LARGEST))
+    for fault in found:
+        print(fault, file=sys.stderr)
+    if not found:
+        print(f"wrote the book, {size(OUT):.1f} MB: open {os.path.relpath(OUT)}/index.html")
+    return len(found) > 0
+
+
+def bring_films(folder, project=ROOT):
+    """Copy the films and pictures that tags of HTML ask for: Sphinx follows links of Markdown alone."""
+    for path in sorted(folder.rglob("*.html")):
+        for link in Page(path).links:
+            wanted = Path(os.path.normpath(path.parent / unquote(urlsplit(link).path)))
+            if wanted.suffix in FILMS and wanted.is_relative_to(folder) and not wanted.exists():
+                original = project / wanted.relative_to(folder)
+                if original.is_file():
+                    wanted.parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copy(original, wanted)
 
 
 def gather():
@@ -90,10 +104,11 @@ def gather():
     (SOURCE / "notebooks").mkdir(parents=True)
     write_api(SOURCE / "api")
     texts = {SOURCE / page: (ROOT / page).read_text(encoding="utf-8") for page in PAGES}
-    texts[SOURCE / "index.md"] = (ROOT / "book" / "index.md").read_text(encoding="utf-8")
+    first = (ROOT / "book" / "index.md").read_text(encoding="utf-8")
+    texts[SOURCE / "index.md"] = GLOB.sub(lambda found: found[0] if any(ROOT.glob(found[1])) else "", first)
     for page, text in texts.items():
         page.parent.mkdir(exist_ok=True)
-        page.write_text(CODE_LINK.sub(link_to_api, text), encoding="utf-8")
+        page.write_text(linked(text), encoding="utf-8")
     for page, text in texts.items():
         for link in FILE_LINK.findall(text):
             adopt((page.parent / link).resolve())
@@ -140,6 +155,7 @@ def contents(names, sentences):
     yield table({f":doc:`{name}`": sentences[name] for name in names})
 
 
+@cache
 def modules():
     """First sentence of every module, read without importing it: not everybody has PyBullet."""
     sentences = {}
@@ -201,113 +217,31 @@ def place(module):
 
 
 def prepare(path):
-    """Execute one notebook where it lies, and keep the result among the sources."""
-    notebook = nbformat.read(path, as_version=4)
-    place = {"metadata": {"path": str(path.parent)}}
-    client = NotebookClient(notebook, timeout=TIMEOUT, resources=place, extra_arguments=QUIET)
-    client.on_cell_executed = lambda cell, **_: freeze_widgets(cell, client)
-    try:
-        client.execute()
-    except CellExecutionError as error:
-        if error.ename != "ImportError":
-            raise
-        print(f"{path.name} is not executed: {error.evalue}", file=sys.stderr)
-    notebook.metadata.pop("widgets", None)
-    for cell in notebook.cells:
-        if cell.cell_type == "markdown":
-            cell.source = NAME.sub(link_to_name, cell.source)
+    """Execute one notebook, and keep the result among the sources, fit to be read."""
+    notebook = execute(path)
+    make_readable(notebook, linked)
     nbformat.write(notebook, SOURCE / "notebooks" / path.name)
 
 
+def linked(text):
+    """Markdown with links to the API: for sources of modules, and for names that begin with dollop."""
+    return NAME.sub(link_to_name, CODE_LINK.sub(link_to_api, text))
+
+
 def link_to_name(found):
-    """A public name in the prose as a link to its entry in the API; other code stays as it is.
+    """A name in the prose as a link to its entry in the API; other code stays as it is.
 
-    >>> NAME.sub(link_to_name, "`dollop.observe` of `dollop.plot`")
-    '{py:obj}`dollop.observe <dollop.observation.observe>` of `dollop.plot`'
+    >>> NAME.sub(link_to_name, "`dollop.observe` of `dollop.lab` by `dollop.plot`")
+    '{py:obj}`dollop.observe <dollop.observation.observe>` of {py:mod}`dollop.lab` by {py:mod}`dollop.plot`'
+    >>> NAME.sub(link_to_name, "`dollop.lab.Pioneer`, `dollop.json`")
+    '{py:obj}`dollop.lab.Pioneer`, `dollop.json`'
     """
-    if found["first"] not in PUBLIC:
-        return found[0]
-    return f"{{py:obj}}`dollop.{found['name']} <{home(found['name'])}>`"
-
-
-def freeze_widgets(cell, client):
-    """Replace a widget by a still while it shows what the cell made: later cells may move it."""
-    for output in cell.get("outputs", []):
-        view = output.get("data", {}).get(WIDGET)
-        if view and "image/png" in output.data:  # a clickable figure brings its own still
-            output.data = {"image/png": output.data["image/png"]}
-        elif view:
-            picture = still(client.widget_state, client.widget_buffers, view["model_id"])
-            output.data = {"text/html": picture}
-
-
-def still(states, buffers, root):
-    """HTML of a widget: where its controls stand, and the picture that belongs to it."""
-    parts = list(descendants(states, root))
-    settings = html.escape(", ".join(filter(None, (setting(states[part]) for part in parts))))
-    values = [buffers[part]["value",] for part in parts if ("value",) in buffers.get(part, {})]
-    sources = (f"data:image/png;base64,{value['data'].strip()}" for value in values)
-    images = "".join(f'<img alt="{settings}" src="{source}">' for source in sources)
-    words = f"In the live notebook, controls move this. Here: {settings}."
-    return f'<p class="still">{words}</p>{images}'
-
-
-def descendants(states, name):
-    """Names of a widget and of everything inside it, in order."""
-    yield name
-    for child in states[name].get("children", []):
-        yield from descendants(states, child.removeprefix("IPY_MODEL_"))
-
-
-def setting(state):
-    """What a control is called and where it stands; nothing for what stands nowhere (a button).
-
-    >>> setting({"description": "x [m]", "value": 1.3})
-    'x [m] = 1.3'
-    """
-    value = state.get("value")
-    if "_options_labels" in state:
-        value = state["_options_labels"][state["index"]]
-    if not state.get("description") or value is None:
-        return None
-    return f"{state['description']} = {value}"
-
-
-class Page(HTMLParser):
-    """What a page of HTML links to, and the anchors that it offers."""
-
-    def __init__(self, path):
-        super().__init__()
-        self.links, self.anchors = [], set()
-        self.feed(path.read_text(encoding="utf-8"))
-
-    def handle_starttag(self, tag, attrs):
-        """Note the links and the anchors of one tag."""
-        values = dict(attrs)
-        self.links += [values[key] for key in ("href", "src") if values.get(key)]
-        self.anchors |= {values.get("id"), values.get("name")}
-
-
-def dead_links(folder):
-    """Links that lead nowhere, each after its page; of addresses elsewhere the form is judged."""
-    pages = {path: Page(path) for path in sorted(folder.resolve().rglob("*.html"))}
-    for path, page in pages.items():
-        for link in page.links:
-            if not leads_somewhere(link, path, pages):
-                yield f"{path.relative_to(folder.resolve())}: {link}"
-
-
-def leads_somewhere(link, path, pages):
-    """Whether the file of a link exists and has its anchor."""
-    address = urlsplit(link)
-    if address.scheme in ("http", "https"):
-        return "." in address.netloc
-    if address.scheme:
-        return address.scheme in ("data", "mailto")
-    target = (path.parent / unquote(address.path)).resolve() if address.path else path
-    if not address.fragment:
-        return target.is_file()
-    return target in pages and unquote(address.fragment) in pages[target].anchors
+    name = f"dollop.{found['name']}"
+    if found["first"] in PUBLIC:
+        return f"{{py:obj}}`{name} <{home(found['name'])}>`"
+    if name in modules():
+        return f"{{py:mod}}`{name}`"
+    return f"{{py:obj}}`{name}`" if f"dollop.{found['first']}" in modules() else found[0]
 
 
 if __name__ == "__main__":

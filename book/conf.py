@@ -5,6 +5,7 @@ napoleon understands their numpydoc sections. (autosummary could write the pages
 module dollop.laps for the function.)
 """
 
+import os
 import re
 import sys
 from importlib.util import find_spec
@@ -31,6 +32,7 @@ myst_enable_extensions = ["dollarmath", "html_image"]
 myst_heading_anchors = 3  # as GitHub has them
 nb_execution_mode = "off"  # book/build.py has executed them
 nb_output_stderr = "remove"
+nb_code_prompt_show = nb_code_prompt_hide = "Solution"  # what exercises hide
 nb_ipywidgets_js = {}  # stills stand in for widgets, so nothing has to come from a network
 exclude_patterns = [".doctrees"]
 
@@ -45,8 +47,10 @@ napoleon_use_rtype = False
 html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["book.css"]
+html_js_files = ["book.js", ("buttons.js", {"data-repository": os.environ.get("GITHUB_REPOSITORY", "")})]
 html_show_sourcelink = False
 html_copy_source = False
+html_domain_indices = False  # the first page of the API has the modules, in the order of the paper
 html_theme_options = {
     "navigation_with_keys": True,
     "light_css_variables": {"color-brand-primary": "#0072B2", "color-brand-content": "#0072B2"},
@@ -77,7 +81,7 @@ def plain_text_first(app, what, name, thing, options, lines):
         prose = line if line[:1] in ("", " ", ">", "=") else line.replace("|", r"\|")
         lines[n] = re.sub(r"(?<!`)`(\.\w[\w.()]*)`(?!`)", r"``\1``", prose)
     if what in ("property", "attribute", "data"):
-        lines.insert(0, "")  # or napoleon takes what stands before a colon for a type
+        lines[:0] = ["..", ""]  # a comment, or napoleon takes what stands before a colon for a type
 
 
 def formulas_as_they_stand(app, what, name, thing, options, lines):
@@ -129,8 +133,11 @@ def by_short_name(app, env, node, contnode):
     if node.get("refdomain") != "py":
         return None
     objects = env.domains.python_domain.objects
-    target = node["reftarget"].removeprefix("dollop.")
-    found = called(target, objects) or called(target.split(".")[-1], objects)
+    if not CALLED:
+        CALLED.update(by_endings(objects))
+    parts = node["reftarget"].removeprefix("dollop.").split(".")
+    endings = (".".join(parts[n:]) for n in range(len(parts)))
+    found = next((CALLED[ending] for ending in endings if ending in CALLED), [])
     if len(found) == 1:
         to = objects[found[0]]
         return make_refnode(app.builder, node["refdoc"], to.docname, to.node_id, contnode, found[0])
@@ -139,11 +146,20 @@ def by_short_name(app, env, node, contnode):
     return None
 
 
-def called(short, objects):
-    """Full names of the objects that are called so; what belongs to a class only with its class."""
-    kinds = SHORT | MEMBERS if "." in short else SHORT
-    names = [name for name, to in objects.items() if to.objtype in kinds]
-    return [name for name in names if name.endswith(f".{short}")]
+CALLED = {}
+"""Full names by what they end in, once all pages are read."""
+
+
+def by_endings(objects):
+    """Full names of the objects, by every ending; what belongs to a class only with its class."""
+    called = {}
+    for name, to in objects.items():
+        parts = name.split(".")
+        first = 1 if to.objtype in SHORT else 2
+        if to.objtype in SHORT | MEMBERS:
+            for length in range(first, len(parts)):
+                called.setdefault(".".join(parts[-length:]), []).append(name)
+    return called
 
 
 def setup(app):

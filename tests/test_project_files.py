@@ -40,8 +40,24 @@ def steps_of(path):
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
 def test_every_workflow_calls_make_test(path):
-    """Continuous integration does what `make test` does."""
-    assert "make test" in [step.get("run") for step in steps_of(path)]
+    """Continuous integration does what `make test` does; what publishes the book does what `make book` does.
+
+    That one has nothing to test: what lands on main is tested by the workflow for pull requests at the same time, and
+    `make book` executes the notebooks, whose checks fail it.
+    """
+    target = "make book" if path.stem == "book" else "make test"
+    assert target in [step.get("run") for step in steps_of(path)]
+
+
+def test_the_book_is_published_from_main_as_make_book_lays_it_out():
+    """The folder that book/build.py writes; only the job that publishes it may write anything."""
+    workflow = parsed(ROOT / ".github" / "workflows" / "book.yml")
+    assert workflow[True]["push"] == {"branches": ["main"]} and workflow["permissions"] == {"contents": "read"}
+    build, publish = workflow["jobs"]["build"], workflow["jobs"]["publish"]
+    assert [step["with"]["path"] for step in build["steps"] if "pages" in step.get("uses", "")] == ["build/book"]
+    assert 'ROOT / "build" / "book"\n' in (ROOT / "book" / "build.py").read_text(encoding="utf-8")
+    assert "permissions" not in build and publish["permissions"] == {"pages": "write", "id-token": "write"}
+    assert publish["needs"] == "build"
 
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)

@@ -1,11 +1,13 @@
 """The gallery: every panel with its caption, what to look at, and its numbers, as one page.
 
 Captions and looks stand with the drawings (`dollop.replication.figures`); here are the words and
-units of the numbers. Captions carry no measured numbers: those come from metrics.json, so that they
-cannot drift apart.
+units of the numbers, and what a figure comes to in one line. Neither has measured numbers in it:
+those come from metrics.json, so that they cannot drift apart.
 """
 
-__all__ = ["NAMES", "page"]
+import re
+
+__all__ = ["IN_ONE_LINE", "NAMES", "page"]
 
 NAMES = {
     "beams": ("beams", ""),
@@ -75,6 +77,89 @@ the numbers behind it. This page is written by the same command, from [metrics.j
 Names of panels are the paper's; those that begin with x are not in the paper.
 """
 
+OF_THE_PAPER = {
+    "1": ("Agent Orange, a Pioneer 2 DX with a SICK LMS 200", "photograph", "rendered model"),
+    "2": ("the stages of Dollop", "flow diagram", "with the functions and records behind them"),
+    "3": ("one laser scan", "a scan", "{beams} beams"),
+    "4": ("how the user is observed, stage by stage", "flow diagram", "the stages' own pictures"),
+    "5": ("the laboratory with two trash cans", "photograph", "rendered model"),
+    "6a": (
+        "the user's track over five figure-eights",
+        "one loss",
+        "{track_error_mean_m} from the truth on average; near-side bias {bias_m}, of the paper's centroid"
+        " {paper_bias_m}; {losses} losses",
+    ),
+    "6b": (
+        "subgoals and control law",
+        "6 LDS, 20 mm",
+        "{n_segments} LDS, {mean_error_m} to the laps' mean, {mean_error_laps_m} to the single laps;"
+        " {paper_mean_error_m} and {paper_mean_error_laps_m} with every LDS alone, as in the paper",
+    ),
+    "7a": (
+        "ten runs of the robot",
+        '"fairly close"',
+        "of {runs} runs {plain_finished} finish with the paper's kind of control, {plain_mean_distance_m} from the law,"
+        " and {plain_runs_with_collision} touch anything; with Dollop's own {own_finished}, {own_mean_distance_m},"
+        " and {own_runs_with_collision}",
+    ),
+    "7b": (
+        "five runs, each kidnapped",
+        "none hit anything, by coincidence",
+        "of {runs} runs {plain_finished} finish with the paper's kind of control, and {plain_runs_with_collision} with"
+        " a contact; with Dollop's own, which goes round obstacles, {own_finished} and {own_runs_with_collision}",
+    ),
+    "8": (
+        "matching eight corners",
+        "drawing of the idea",
+        "both costs match rightly, the literal one by a hair ({literal_margin} of {literal_cost})",
+    ),
+    "9": ("the springs behind it", "drawing of the idea", "the springs and forces of that matching"),
+    "10a": ("moved obstacles: the subgoals", "one layout", "{layouts} layouts, {matching_right} matched rightly"),
+    "10b": (
+        "moved obstacles: the runs",
+        "one layout",
+        "of {runs} runs {plain_finished} finish with the paper's kind of control and {plain_runs_with_collision} touch"
+        " an obstacle, with Dollop's own {own_finished} and {own_runs_with_collision}",
+    ),
+    "11a": ("a task shown once", "a demonstration", "a slalom of {n_segments} segments"),
+    "11b": ("and again, in a different environment", "a demonstration", "a slalom of {n_segments} segments"),
+    "12a": (
+        "the merged CDHMM",
+        "the most-likely path",
+        "{states_before} subgoals merge into {states_after} states",
+    ),
+    "12b": (
+        "performed in a new environment",
+        "one environment",
+        "of {runs} runs {plain_finished} finish with the paper's kind of control and {plain_runs_with_collision} touch"
+        " a cone, with Dollop's own {own_finished} and {own_runs_with_collision}",
+    ),
+}
+BEYOND_IT = {
+    "x1": (
+        "right matchings against box noise",
+        "",
+        "two random boxes, sides off by 5 cm: literal {literal_2_objects%}, robust {robust_2_objects%}; two cans as the"
+        " laser sees them: {literal_cans_seen%}, {robust_cans_seen%}",
+    ),
+    "x2": (
+        "merging beside hidden Markov models",
+        "",
+        "right from two demonstrations: merging {merging_right_2%}, a left-to-right hidden Markov model"
+        " {left_to_right_right_2%}; of tasks of 8 to 15 subgoals an ergodic one {hmm_longer_right_2%}",
+    ),
+    "x3": (
+        "learning among objects that stand elsewhere each time, beside TP-GMM, ProMP and DMP",
+        "",
+        "after two demonstrations {anchored_error_percent_2} of the way's size off what the person would do, TP-GMM"
+        " {tp_gmm_error_percent_2}, ProMP {promp_error_percent_2}, DMP {dmp_error_percent_2}",
+    ),
+}
+IN_ONE_LINE = OF_THE_PAPER | BEYOND_IT
+"""What each panel shows, what the paper has there, and what is here; numbers in braces, % for a share."""
+
+NUMBER = re.compile(r"\{(\w+)(%?)\}")
+
 
 def page(panels, metrics):
     """The gallery as Markdown.
@@ -96,7 +181,36 @@ def page(panels, metrics):
         A number that nobody has named in words.
     """
     shown = [panel for panel in panels if panel.id in metrics]
-    return "\n".join([HEAD, *(section(panel, metrics[panel.id]) for panel in shown)])
+    sections = [section(panel, metrics[panel.id]) for panel in shown]
+    return "\n".join([HEAD, overview(shown, metrics), *sections])
+
+
+def overview(panels, metrics):
+    """All of them as one table: what each shows, what the paper has, and what came of it here."""
+    head = ["| figure | shows | the paper | here |", "|---|---|---|---|"]
+    return "\n".join([*head, *(row(panel, metrics[panel.id]) for panel in panels)]) + "\n"
+
+
+def row(panel, numbers):
+    """One panel in one line, led by a link to its section.
+
+    One that nobody has put into a line has its caption there, and one that was made without the
+    line's numbers ends without them.
+    """
+    shows, paper, here = IN_ONE_LINE.get(panel.id, (panel.caption.rstrip("."), "", ""))
+    if all(name in numbers for name, _ in NUMBER.findall(here)):
+        here = NUMBER.sub(lambda found: amount(found, numbers, panel.columns), here)
+    else:
+        here = ""
+    return f"| [{panel.id}](#figure-{panel.id}) | {shows} | {paper or '–'} | {here or '–'} |"
+
+
+def amount(found, numbers, columns):
+    """The number that braces stand for."""
+    key, percent = found.groups()
+    if percent:
+        return f"{100 * numbers[key]:.0f} %"
+    return quantity(numbers[key], NAMES[name_of(key, columns)][1])
 
 
 def section(panel, numbers):

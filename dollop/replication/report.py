@@ -340,7 +340,7 @@ def stale(text, root):
     ----------
     text : str
     root : Path
-        The folder that the files' paths begin in.
+        The folder that the files' paths begin in: that of the text.
 
     Returns
     -------
@@ -362,7 +362,7 @@ def stale(text, root):
     return found
 
 
-REFERRED = re.compile(r'\[([^\]]+)\]\(((?:study|figures)/\w+\.json) "([^"]+)"\)')
+REFERRED = re.compile(r'\[([^\]]+)\]\(((?:\.\./)?(?:study|figures)/\w+\.json) "([^"]+)"\)')
 
 
 # ---- writing it all

@@ -1,6 +1,8 @@
 """The gallery page: complete, in step with the numbers, and readable."""
 
 import json
+import re
+from dataclasses import replace
 
 import pytest
 from places import ROOT
@@ -37,6 +39,43 @@ def test_captions_carry_no_measured_numbers():
     for panel in FIGURES.values():
         text = panel.caption + panel.look.replace("The paper: 6 LDS, 20 mm on average.", "")
         assert " mm" not in text, panel.id
+
+
+def test_the_page_opens_with_a_table_that_has_a_row_and_a_link_for_every_panel():
+    """Before the first picture, in the order of the paper, each linked to its section."""
+    page = gallery.page(FIGURES.values(), METRICS)
+    table = page[: page.index("\n## ")]
+    linked = re.findall(r"^\| \[(\w+)\]\(#figure-(\w+)\) \|", table, re.MULTILINE)
+    assert linked == [(id, id) for id in METRICS]
+    assert all(f"\n## Figure {id}\n" in page for id in METRICS)
+
+
+def test_the_table_has_its_numbers_from_the_file():
+    """Every number that a line names is in metrics.json, and is written as on the rest of the page."""
+    for id, (_, _, here) in gallery.IN_ONE_LINE.items():
+        assert {name for name, _ in gallery.NUMBER.findall(here)} <= METRICS[id].keys(), id
+    numbers = {"n_segments": 7, "mean_error_m": 0.0304, "mean_error_laps_m": 1.2}
+    numbers |= {"paper_mean_error_m": 0.001, "paper_mean_error_laps_m": 0.002}
+    row = gallery.row(FIGURES["6b"], numbers)
+    assert "| 7 LDS, 30 mm to the laps' mean, 1.20 m to the single laps; 1 mm and 2 mm with" in row
+    assert gallery.NUMBER.sub(lambda found: gallery.amount(found, {"a": 0.456}, {}), "{a%}") == "46 %"
+
+
+def test_the_tables_own_words_carry_no_measured_numbers():
+    """Digits in them are those of names, of what the paper reports, and of settings."""
+    said = ("Pioneer 2 DX", "LMS 200", "6 LDS, 20 mm", "by 5 cm", "8 to 15 subgoals")
+    for id, words in gallery.IN_ONE_LINE.items():
+        text = gallery.NUMBER.sub("", " ".join(words))
+        for setting in said:
+            text = text.replace(setting, "")
+        assert not re.search("[0-9]", text), id
+
+
+def test_a_panel_that_is_in_no_line_has_its_caption_there():
+    """A figure that somebody adds is on the page before it has words, and one without its numbers says none."""
+    panel = replace(FIGURES["6b"], id="x99")
+    assert gallery.row(panel, {}) == f"| [x99](#figure-x99) | {panel.caption.rstrip('.')} | – | – |"
+    assert gallery.row(FIGURES["6b"], {}).endswith("| 6 LDS, 20 mm | – |")
 
 
 def test_panels_without_numbers_are_left_out():
