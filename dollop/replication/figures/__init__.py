@@ -19,13 +19,16 @@ from dollop.formats.files import FormatError
 from dollop.formats.kinds import PNG, Kind
 from dollop.formats.writing import check_writable, together, whole_file
 from dollop.replication import drawing, gallery
-from dollop.replication.figures import environment, learning, moved, observing, performing  # noqa: F401
+from dollop.replication.figures import environment, kept, learning, moved, observing, performing  # noqa: F401
 from dollop.replication.figures.panel import PANELS
 
-__all__ = ["FIGURES", "differences", "main", "make", "show"]
+__all__ = ["FIGURES", "RUNS", "differences", "kept_runs", "main", "make", "show"]
 
 FIGURES = {each.id: each for each in sorted(PANELS.values(), key=lambda each: each.picture)}
 """Every panel by id, in the paper's order; the modules above register theirs when imported."""
+
+RUNS = {"7a": "eight_runs", "7b": "kidnapped_runs", "10b": "runs_in_every_layout", "12b": "slalom_runs"}
+"""Panels of runs, and under which name these are kept."""
 
 METRICS = Kind("numbers of figures", rb'\A\s*\{\s*(?:\}|"\w+": ?\{)')
 PDF = Kind("a PDF", rb"\A%PDF-")
@@ -83,13 +86,40 @@ def as_written(metrics):
     return {name: rounded(value) for name, value in plain.items()}
 
 
-def show(id):
+def kept_runs(id):
+    """The runs of a panel that were kept when it was made.
+
+    Parameters
+    ----------
+    id : str
+        A key of `RUNS`.
+
+    Returns
+    -------
+    dict
+        Lists of Run by kind of control, "plain" and "own", those of several layouts one after the other;
+        empty where none were kept by the code of today.
+    """
+    found = kept.read(RUNS[id]) or {}
+    return {kind: list(flat(runs)) for kind, runs in found.items()}
+
+
+def flat(runs):
+    """Each of some runs, in lists or not."""
+    for each in runs:
+        yield from flat(each) if isinstance(each, list) else (each,)
+
+
+def show(id, fresh=False):
     """Draw one panel where a notebook shows it, by the code that writes it into a file.
 
     Parameters
     ----------
     id : str
         A key of `FIGURES`.
+    fresh : bool
+        Drive the robot's runs here. Otherwise those are drawn that were kept when the figure was made,
+        if the code that drove them is that of today; it is printed.
 
     Returns
     -------
@@ -102,8 +132,10 @@ def show(id):
     except ImportError as error:
         print(f"Figure {id} is not drawn here: {error}")
         return {}
+    if id in RUNS and not fresh and kept_runs(id):
+        print(f"Figure {id}: runs that were driven by this very code when it was made, and kept")
     plt.draw_if_interactive()  # begins the notebook's way of showing, which the style's end would undo
-    with drawing.journal():
+    with drawing.journal(), kept.handled("driven" if fresh else "read"):
         _, metrics = FIGURES[id].draw()
     return as_written(metrics)
 
@@ -184,13 +216,18 @@ def main(arguments=None):
     made, done = tqdm(panels, desc="figures", unit="panel", file=sys.stderr), 0
     try:
         for done, id in enumerate(made):  # noqa: B007
-            with together():
+            with together(), kept.handled("kept" if is_committed(folder) else "driven"):
                 numbers = make(id, folder)
                 write_numbers(folder, numbers_in(folder) | {id: numbers})
     except KeyboardInterrupt:
         made.close()
         raise KeyboardInterrupt(f"{done} of {len(panels)} panels are done, with their numbers") from None
     print(f"wrote {len(panels)} panels, metrics.json and the gallery README.md into {folder}/")
+
+
+def is_committed(folder):
+    """Whether a folder is the one that is committed, beside which runs are kept."""
+    return folder.resolve() == kept.FOLDER.parents[1] / "figures"
 
 
 def numbers_in(folder):

@@ -5,6 +5,7 @@ import numpy as np
 
 from dollop import plot
 from dollop.replication import drawing, recordings
+from dollop.replication.figures.kept import keep
 from dollop.replication.runs import distances_to_law
 from dollop.trajectory import arc_length, resample
 
@@ -66,7 +67,7 @@ def by_kind(work):
         By kind, a key of `CONTROLS`.
     """
     choices = [choices for _, choices in CONTROLS.values()]
-    return dict(zip(CONTROLS, at_once(work, choices), strict=True))
+    return keep(work.__name__, lambda: dict(zip(CONTROLS, at_once(work, choices), strict=True)))
 
 
 def draw_runs(ax, task, runs, method="held"):
