@@ -74,7 +74,8 @@ HEAD = """\
 
 Every panel, drawn by `make figures` from nothing but seeds, with its caption, what to look at, and
 the numbers behind it. This page is written by the same command, from [metrics.json](metrics.json).
-Names of panels are the paper's; those that begin with x are not in the paper.
+Names of panels are the paper's; those that begin with x are not in the paper. Below each picture is the
+same for print, in the width of a column.
 """
 
 OF_THE_PAPER = {
@@ -154,6 +155,12 @@ BEYOND_IT = {
         "after two demonstrations {anchored_error_percent_2} of the way's size off what the person would do, TP-GMM"
         " {tp_gmm_error_percent_2}, ProMP {promp_error_percent_2}, DMP {dmp_error_percent_2}",
     ),
+    "x4": (
+        "three demonstrations, one with a detour",
+        "",
+        "{states_before} subgoals merge into {states_after} states; {states_aside} of them are the detour's, which the"
+        " most-likely path leaves aside",
+    ),
 }
 IN_ONE_LINE = OF_THE_PAPER | BEYOND_IT
 """What each panel shows, what the paper has there, and what is here; numbers in braces, % for a share."""
@@ -214,11 +221,12 @@ def amount(found, numbers, columns):
 
 
 def section(panel, numbers):
-    """One panel: heading, picture, what to look at, numbers."""
+    """One panel: heading, picture, its PDF if it has one, what to look at, numbers."""
     parts = [
         f"## Figure {panel.id}",
         f"*{panel.caption}*",
         f"![Figure {panel.id}: {panel.caption}]({panel.picture})",
+        *([f"[For print (PDF)]({panel.printed})"] if panel.printed else []),
         f"**What to look at.** {panel.look}",
     ]
     return "\n\n".join(parts + ([table(numbers, panel.columns)] if numbers else [])) + "\n"

@@ -34,6 +34,13 @@ def test_every_picture_on_the_page_exists():
         assert (FOLDER / panel.picture).exists()
 
 
+def test_every_drawing_has_its_pdf_on_the_page():
+    """Linked below the picture; what is nothing but pixels has none."""
+    page = gallery.page(FIGURES.values(), METRICS)
+    printed = {panel.printed for panel in FIGURES.values() if panel.printed}
+    assert set(re.findall(r"\((fig_\w+\.pdf)\)", page)) == printed == {path.name for path in FOLDER.glob("*.pdf")}
+
+
 def test_captions_carry_no_measured_numbers():
     """Millimetres beside a panel come from metrics.json, save for what the paper reports."""
     for panel in FIGURES.values():
