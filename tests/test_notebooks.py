@@ -161,31 +161,35 @@ def pictures_of(*cells):
     return [[image.open(io.BytesIO(base64.b64decode(png))).size for png in shown] for shown in pngs]
 
 
-@pytest.fixture
-def inline(monkeypatch):
-    """Notebooks draw inline where nothing else is asked for."""
-    monkeypatch.delenv("MPLBACKEND", raising=False)
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+@pytest.fixture(scope="module")
+def inline():
+    """Pictures of a notebook that draws inline, where nothing else is asked for: a panel, a line, a rendering.
+
+    The panel comes first; before the last, which is rendered, a figure was drawn into.
+    """
+    pytest.importorskip("pybullet", reason="figures.show needs the extra lab")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("MPLBACKEND", raising=False)
+        patch.setenv("PYTHONPATH", str(ROOT))
+        return pictures_of(
+            'from dollop.replication import figures\nnumbers = figures.show("2")',
+            "import matplotlib.pyplot as plt\nplt.plot([1, 2])",
+            "import numpy as np\nplt.figure()\nplt.close()\n"
+            "from dollop.replication import drawing\nfigure = drawing.picture(np.zeros((300, 400, 3), np.uint8))",
+        )
 
 
 @pytest.mark.replication
 def test_a_panel_is_seen_where_nothing_was_drawn_before(inline):
     """And so is what a reader draws after it."""
-    pytest.importorskip("pybullet", reason="figures.show needs the extra lab")
-    panel, line = pictures_of(
-        'from dollop.replication import figures\nnumbers = figures.show("2")',
-        "import matplotlib.pyplot as plt\nplt.plot([1, 2])",
-    )
+    panel, line, _ = inline
     assert len(panel) == len(line) == 1
 
 
 @pytest.mark.replication
 def test_a_rendered_picture_is_seen_whole(inline):
     """It has no axes that anybody drew into, and is not taken for empty; nothing of it is cut off."""
-    ((size,),) = pictures_of(
-        "import numpy as np\nimport matplotlib.pyplot as plt\nplt.figure()\nplt.close()\n"
-        "from dollop.replication import drawing\nfigure = drawing.picture(np.zeros((300, 400, 3), np.uint8))"
-    )
+    *_, (size,) = inline
     assert size[0] >= 400 and size[1] >= 300
 
 

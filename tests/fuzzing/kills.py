@@ -165,7 +165,7 @@ def library(observes=observes):
 
 
 def figure(folder, version):
-    """A figure whose drawing is small."""
+    """A figure whose drawing is small, with no type in it: to put a font into a PDF takes a second."""
     import matplotlib.pyplot as plt
 
     from dollop import figures as door
@@ -174,6 +174,7 @@ def figure(folder, version):
     def draw():
         drawn, ax = plt.subplots(figsize=(1, 1))
         ax.plot([0, 1 + version])
+        ax.set_axis_off()
         return drawn, {"runs": version}
 
     FIGURES["8"] = replace(FIGURES["8"], draw=draw)
@@ -209,7 +210,11 @@ def replication():
     """Writers of the replication."""
     if not find_spec(EXTRAS["lab"]):
         return
-    import dollop.replication.figures  # noqa: F401, before the first fork
+    import matplotlib.backends.backend_agg
+    import matplotlib.backends.backend_pdf  # noqa: F401
+
+    import dollop.replication.figures
+    import dollop.replication.worlds.survey  # noqa: F401, all of them before the first fork
 
     names = "figure_eights", "moved_cones", "slalom_0", "slalom_1"
     shown = [(f"{name}.log.gz", f"{name}_truth.csv", f"{name}_scene.json") for name in names]

@@ -48,21 +48,21 @@ def test_the_same_seed_gives_the_same_shares():
     assert shares.robust[0.1] == pytest.approx(shares.robust[0.0], abs=0.05)
 
 
-def test_the_robust_method_is_right_on_300_layouts_each():
+def test_the_robust_method_is_right_on_150_layouts_each():
     """Boxes off by 5 cm, moved by 0.4 m: right in 99, 97, 90 % for 2, 3, 4 cans; the literal method in under half."""
-    shares = matching_shares(noises=(0.05,)).pivot(index="objects", columns="method", values="right")
+    shares = matching_shares(noises=(0.05,), layouts=150).pivot(index="objects", columns="method", values="right")
     assert (shares["robust"] >= [0.99, 0.97, 0.90]).all()
     assert (shares["literal"] < 0.5).all()
 
 
 def test_the_robust_method_is_right_where_a_can_is_missing_or_added():
-    """Three cans, one missing or one added: right in 95 % of 300 layouts, in 99 % of those it is confident about."""
-    shares = matching_shares(objects=(3,), noises=(0.05,), changes=("missing", "added"))
+    """Three cans, one missing or one added: right in 95 % of 150 layouts, in 99 % of those it is confident about."""
+    shares = matching_shares(objects=(3,), noises=(0.05,), changes=("missing", "added"), layouts=150)
     assert (shares["right"] >= 0.95).all()
     assert (shares["right_if_confident"] >= 0.99).all()
 
 
 def test_the_robust_method_follows_layouts_that_turned():
-    """Three and four cans turned by a right angle: right in 90 %, the corners turned too."""
-    shares = matching_shares(objects=(3, 4), noises=(0.05,), layouts=150, turn=np.pi / 2, moved=0.15)
+    """Three and four cans turned by a right angle: right in 90 % of 75, the corners turned too."""
+    shares = matching_shares(objects=(3, 4), noises=(0.05,), layouts=75, turn=np.pi / 2, moved=0.15)
     assert (shares[shares.method == "robust"].right >= 0.9).all()

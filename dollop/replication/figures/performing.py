@@ -145,7 +145,7 @@ def figure_7b():
     task, runs_of = recordings.figure_eights().task, by_kind(recordings.kidnapped_runs)
     count = len(runs_of["plain"])
     size = drawing.WIDTH, 0.92 * count + 0.9
-    figure, axes = plt.subplots(count, 2, figsize=size, sharex=True, sharey=True)
+    figure, axes = plt.subplots(count, 2, figsize=size, sharex=True, sharey=True, squeeze=False)
     for column, (kind, runs) in zip(axes.T, runs_of.items(), strict=True):
         for k, (ax, run) in enumerate(zip(column, runs, strict=True)):
             draw_kidnapped(ax, task, run, k, RESPONSES[kind])
