@@ -513,11 +513,11 @@ def draw_room(ax, lesson):
     left, low, right, high = lesson.scene.room.bounds
     plot.plane(ax).set(xlim=(left, right), ylim=(low, high))
     for part in lesson.scene.room.furniture:
-        ax.add_patch(Polygon(part.outline.border, facecolor=plot.BACKGROUND, alpha=0.3))
+        ax.add_artist(Polygon(part.outline.border, facecolor=plot.BACKGROUND, alpha=0.3))
     plot.grid_map(ax, lesson.background)
     ax.set(xlim=(left, right), ylim=(low, high))
     for each in lesson.scene.objects:
-        ax.add_patch(Polygon(each.footprint.border, facecolor=plot.OBSTACLE, alpha=0.25))
+        ax.add_artist(Polygon(each.footprint.border, facecolor=plot.OBSTACLE, alpha=0.25))
     plot.boxes(ax, lesson.seen.boxes, "objects, as seen")
     plot.robot(ax, lesson.scene.robot.pose, label="robot that watches")
 
