@@ -66,6 +66,7 @@ class Classroom:
         self._hearers, self._going, self._trail, self._carry = [], None, None, None
         self._drawn = self._held = None
         self.lesson = Lesson.begin(background, scene)
+        plt.draw_if_interactive()  # begins the notebook's way of showing, which a style's end would undo
         self.figure = Figure(figsize=SIZE)
         self._plan, self._known = (self.figure.add_axes(each) for each in (PLAN, KNOWN))
         self._plan.set_anchor("NW")
