@@ -193,6 +193,21 @@ def test_a_rendered_picture_is_seen_whole(inline):
     assert size[0] >= 400 and size[1] >= 300
 
 
+@pytest.mark.replication
+def test_what_is_drawn_after_the_room_is_seen(monkeypatch):
+    """The room of notebook 11 shows itself as a picture, and a picture that a reader draws after it is shown."""
+    pytest.importorskip("pybullet", reason="the laboratory needs the extra lab")
+    pytest.importorskip("ipympl", reason="a room that hears the mouse needs the extra notebooks")
+    monkeypatch.delenv("MPLBACKEND", raising=False)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    room, line = pictures_of(
+        "import dollop\nfrom dollop.replication.teaching.classroom import Classroom\n"
+        'room = Classroom(dollop.OccupancyGrid.load("data/lab.yaml"))\nroom.figure.canvas',
+        "import matplotlib.pyplot as plt\nplt.plot([1, 2])",
+    )
+    assert len(room) == len(line) == 1
+
+
 # ---- style
 
 
